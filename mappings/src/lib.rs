@@ -79,12 +79,14 @@ mod generic_names;
 mod groups;
 mod item;
 mod load;
+mod meaning;
 mod numbers;
 mod origin;
 mod overlay;
 mod resolver;
 mod rows;
 mod sercos;
+mod twice;
 
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@ use serde::de::DeserializeOwned;
 use super::groups;
 use super::load::{Parsed, TableText};
 use super::overlay::{self, Layer};
+use super::twice;
 use crate::finding::{Findings, Problem, Source, partial, registry as code, tree};
 
 /// The rows of a table with what is laid over it, without those with which something is wrong; `None` when none can be read.
@@ -42,6 +43,7 @@ pub(super) fn lay_over<'t, T: DeserializeOwned>(
     for (layer, base) in layers.iter().zip(bases).filter(|(layer, _)| layer.touches(name)) {
         hints.extend(overlay::lay(layer, base, name, tree.get_mut(), &text, findings));
     }
+    twice::leave_out(name, tree.get_mut(), &text, findings);
     let hint = |problem: &Problem| {
         let known = hints.iter().find(|(row, _)| *row == problem.span);
         known.filter(|_| problem.code == code::MISSING_KEY).map(|(_, hint)| hint.about(problem))

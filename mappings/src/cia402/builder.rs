@@ -138,6 +138,14 @@ impl<'a> Builder<'a> {
                 }
             }
         }
+        let listed = |index: u16| self.tables.unbound.iter().any(|(known, _)| *known == index);
+        // The error code stands for the faults.
+        let open = self.dictionaries.cia402.objects().iter().filter(|object| {
+            let family = object.index..=object.last;
+            let bound = self.bound.iter().any(|(index, _)| family.contains(index));
+            object.index != ERROR_CODE.index && !listed(object.index) && !bound
+        });
+        self.tables.unanswered = open.map(|object| object.index).collect();
     }
 
     fn object(&mut self, key: &str, name: &Name) -> Option<(Object, &'a Cia402Sub)> {

@@ -37,7 +37,7 @@ const FULL_RANGE: i64 = 1 << 32;
 
 /// An object that holds a number, and what it measures.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Value {
+pub(crate) struct Value {
     pub object: Object,
     pub width: Width,
     /// Unit as the dictionary names it; empty without.
@@ -46,14 +46,14 @@ pub(super) struct Value {
 
 /// What a count is.
 #[derive(Debug, Clone)]
-pub(super) struct ScalingRule {
+pub(crate) struct ScalingRule {
     pub unit: String,
     pub quantity: Quantity,
     pub methods: Vec<Method>,
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct Method {
+pub(crate) struct Method {
     /// What an object has to say.
     pub when: Option<(Value, i64)>,
     pub base: Base,
@@ -62,14 +62,14 @@ pub(super) struct Method {
 }
 
 #[derive(Debug, Clone)]
-pub(super) enum Base {
+pub(crate) enum Base {
     Generic(Ratio),
     /// The count of the rule in this place.
     Like(usize),
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct SignalRule {
+pub(crate) struct SignalRule {
     pub signal: Signal,
     pub value: Value,
     /// Modes of operation in which it is this object; empty = all that no other rule of the signal has.
@@ -82,14 +82,14 @@ pub(super) struct SignalRule {
 
 /// A mode of operation: its code, and its bit in the list of those that a drive has.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct DriveMode {
+pub(crate) struct DriveMode {
     pub name: String,
     pub code: i8,
     pub bit: u32,
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct ModeRule {
+pub(crate) struct ModeRule {
     pub selection: ModeSelection,
     /// Whether an axis can do without it.
     pub optional: bool,
@@ -103,7 +103,7 @@ pub(super) struct ModeRule {
 
 /// A mode that the drive carries out by itself.
 #[derive(Debug, Clone)]
-pub(super) struct ProcedureRule {
+pub(crate) struct ProcedureRule {
     pub selection: ModeSelection,
     pub modes: Vec<DriveMode>,
     pub start: BitPattern,
@@ -113,7 +113,7 @@ pub(super) struct ProcedureRule {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct ActionRule {
+pub(crate) struct ActionRule {
     pub action: Action,
     pub when: Option<BitPattern>,
     pub pattern: BitPattern,
@@ -166,7 +166,7 @@ pub(crate) struct ReportRule {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct StatusRule {
+pub(crate) struct StatusRule {
     pub object: Object,
     pub pattern: BitPattern,
     pub modes: Vec<i8>,
@@ -189,7 +189,7 @@ pub(crate) struct ParameterAt {
 pub(crate) type ParameterRule = super::drive_rows::ParameterRule<ParameterAt>;
 
 #[derive(Debug, Clone)]
-pub(super) enum StepKind {
+pub(crate) enum StepKind {
     Read(Object),
     Write(Value, i64),
     WriteParameter(Parameter),
@@ -202,7 +202,7 @@ pub(super) enum StepKind {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct StepRule {
+pub(crate) struct StepRule {
     pub kind: StepKind,
     /// Modes of operation of which the axis has to use one; empty = whatever it uses.
     pub modes: Vec<i8>,
@@ -229,21 +229,23 @@ pub(super) struct Words {
 #[derive(Debug, Clone, Default)]
 pub struct Cia402Tables {
     pub(super) units: Vec<FixedUnit>,
-    pub(super) scalings: Vec<ScalingRule>,
+    pub(crate) scalings: Vec<ScalingRule>,
     pub(super) drive: DriveDefaults,
     pub(super) words: Words,
-    pub(super) signals: Vec<SignalRule>,
-    pub(super) modes: Vec<ModeRule>,
-    pub(super) procedures: Vec<ProcedureRule>,
+    pub(crate) signals: Vec<SignalRule>,
+    pub(crate) modes: Vec<ModeRule>,
+    pub(crate) procedures: Vec<ProcedureRule>,
     pub(super) actions: Vec<ActionRule>,
-    pub(super) reports: Vec<ReportRule>,
-    pub(super) status: Vec<StatusRule>,
-    pub(super) faults: Vec<FaultRow>,
-    pub(super) parameters: Vec<ParameterRule>,
-    pub(super) captures: Vec<CaptureRule>,
-    pub(super) steps: Vec<StepRule>,
+    pub(crate) reports: Vec<ReportRule>,
+    pub(crate) status: Vec<StatusRule>,
+    pub(crate) faults: Vec<FaultRow>,
+    pub(crate) parameters: Vec<ParameterRule>,
+    pub(crate) captures: Vec<CaptureRule>,
+    pub(crate) steps: Vec<StepRule>,
     /// Objects that no row binds, a family by its first number, with the reason.
     pub unbound: Vec<(u16, String)>,
+    /// Those that no row binds for no reason.
+    pub(crate) unanswered: Vec<u16>,
 }
 
 impl Cia402Tables {

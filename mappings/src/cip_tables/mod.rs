@@ -239,7 +239,21 @@ pub struct CipTables {
     pub(super) events: EventTables,
 }
 
+impl ServedAttribute {
+    /// Makes one of all that is only stored and given back.
+    pub(super) fn forget_who_stores(&mut self) {
+        if matches!(self.served, Served::Device | Served::Connection) {
+            self.served = Served::Shadow;
+        }
+    }
+}
+
 impl CipTables {
+    /// Forgets the rows of units.
+    pub(super) fn forget_units(&mut self) {
+        self.units.clear();
+    }
+
     /// How `unit` becomes `quantity`; an attribute without a unit is a bare number.
     pub(super) fn unit(&self, unit: &str, quantity: Quantity) -> Option<CipUnit> {
         if unit.is_empty() && quantity == Quantity::None {

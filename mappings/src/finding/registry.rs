@@ -300,7 +300,7 @@ registry! {
 
     FACT_FAILS = 47 Error "a drive would not do what it is commanded":
         "`check` sends frames through the gateway with these tables. Each shows a fact of the standards: a positive velocity turns a drive forward, an enable request switches it on, an error is reported as the exception that it is. With these tables a direction, a state or a request comes out differently.",
-        "[[cip-generic.fault]]\ncause = \"over_voltage\"\nexception = \"Bus Undervoltage FL\"\n\n[[cip-generic.fault]]\ncause = \"under_voltage\"\nexception = \"Bus Overvoltage FL\"",
+        "[[generic-cia402.fault]]\ncodes = [\"DC link under-voltage\", \"Under-voltage 1\", \"Under-voltage 2\"]\ncause = \"over_voltage\"",
         "Correct the row. If the drive really is so, write `# accept: reason` next to the row.";
     FACT_DIFFERS = 48 Warning "a value differs from the standard":
         "As for AX0047, but the value has the right sign and a wrong magnitude: a scaling, a unit, a limit.",
@@ -375,6 +375,22 @@ registry! {
         "The drive has already switched itself off for this error. A row that makes a warning of it lets the controller believe that the axis still moves.",
         "[[generic-sercos.fault]]\nword = \"Class 1 diagnostic\"\npattern = [{ field = \"Overload shut-down\", is = 1 }]\ncause = \"motor_overload_user_limit\"\nreaction = \"alarm\"",
         "Remove `reaction`.";
+    POLICY_WEAK = 66 Error "what is required may be missing in silence":
+        "`missing` and `refused` say what happens where a drive lacks a value or refuses a step. A set-point, the actual position, an operating mode of the axis and a limit of the configuration are required: without one, the drive must not come to operation as if it were there. A value that the controller reads is told as missing, and not as 0.",
+        "[[generic-sercos.signal]]\nsignal = \"velocity_command\"\nmissing = \"omit\"",
+        "Write the policy that the finding names. If the axis can really do without it, write `# accept: reason` next to the row.";
+    WRONG_FAULT = 67 Error "a fault that is reported as another one":
+        "The bit or the class of the drive, or the cause of the fault catalogue, has a name in the standard on the other side, and the row names another one. Whoever reads the fault looks for something that is not broken.",
+        "[[generic-sercos.fault]]\nword = \"Class 1 diagnostic\"\npattern = [{ field = \"Overvoltage error\", is = 1 }]\ncause = \"under_voltage\"",
+        "Write the name that the finding shows. If this drive means something else with it, write `# accept: reason` next to the row.";
+    NOTHING_BOUND = 68 Warning "something of the profile that no row binds":
+        "The profile has a value, a status bit, an edge, an event or a step of commissioning that the axis comes to operation without, and no row of the tables has it. Most likely a row was removed.",
+        "[[generic-sercos.status]]\nstatus = \"torque_limit\"\nword = \"Class 3 diagnostic\"\npattern = [{ field = \"Torque at limit\", is = 1 }]\nremove = true",
+        "Add the row. Name an IDN or object that is left out on purpose in an [[unbound]] row with the reason.";
+    MODES_DIFFER = 69 Warning "a value that one mode shows and another one does not":
+        "Each [[mode]] row lists what comes from the drive in its mode. What one of them has and another one of the same table has not is missing in that mode, although the drive has it: the controller is told nothing, or an input is not seen.",
+        "[[generic-sercos.mode]]\nmode = \"torque\"\nactual = [\"position_actual\", \"torque_actual\"]",
+        "Add it to `actual`. If the drives lack it in this mode, write `# accept: reason` next to the row.";
 
     OVERLAY_NO_EFFECT = 70 Warning "a row that changes nothing":
         "The row of the overlay says what the table already says. Either the table now has the change, or something else was meant.",

@@ -346,7 +346,7 @@ fn identity(section: &Section, row: &DeTable<'_>) -> Option<String> {
 }
 
 /// The same text for the same value, however it is written.
-fn canonical(value: &DeValue<'_>) -> String {
+pub(crate) fn canonical(value: &DeValue<'_>) -> String {
     let mut text = String::new();
     write_canonical(value, &mut text);
     text

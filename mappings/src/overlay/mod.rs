@@ -34,7 +34,7 @@ use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source, Spanned, closest, partial, read_file, tree};
 
 pub(super) use families::{FAMILIES, ParsedFamily, parse as parse_families};
-pub(super) use merge::{Hints, lay};
+pub(super) use merge::{Hints, canonical, lay};
 pub use sections::{Section, sections};
 
 /// The most overlays: one for the family of drives, one for the drive, one for the machine are usual.

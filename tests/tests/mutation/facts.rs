@@ -22,7 +22,7 @@ const SAMPLE: usize = 25;
 /// Who notices a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Noticed {
-    /// Nothing is sent or reported otherwise: the resolved tables are the same.
+    /// Nothing is sent or reported otherwise: the tables mean the same (`Mapping::meaning` says why).
     Same,
     /// The checks of the tables.
     Check,
@@ -40,14 +40,10 @@ struct Case {
 
 struct Judge {
     mapping: Mapping,
+    /// What the shipped tables mean.
     tables: String,
     /// Errors and warnings of the shipped tables.
     findings: usize,
-}
-
-/// Everything that the tables resolve to.
-fn resolved(mapping: &Mapping) -> String {
-    format!("{:?}{:?}{:?}", mapping.cip, mapping.sercos, mapping.cia402)
 }
 
 fn serious(findings: &Findings) -> usize {
@@ -59,7 +55,7 @@ impl Judge {
         let mapping = Mapping::embedded().expect("the shipped tables");
         let mut findings = Findings::default();
         check::tables(&mapping, &mut findings);
-        Self { tables: resolved(&mapping), mapping, findings: serious(&findings) }
+        Self { tables: mapping.meaning(), mapping, findings: serious(&findings) }
     }
 
     fn noticed(&self, case: &Case) -> Noticed {
@@ -80,7 +76,7 @@ impl Judge {
         if serious(&findings) > self.findings {
             return Noticed::Check;
         }
-        if resolved(&mapping) == self.tables {
+        if mapping.meaning() == self.tables {
             return Noticed::Same;
         }
         // A table of one profile concerns the drives of that profile alone.
@@ -217,7 +213,7 @@ fn no_more_changes_of_the_sample_survive_than_before() {
 
 /// How many in a hundred changes of the sample nobody notices now. The aim is none that changes what a drive is sent; this bound may
 /// only fall (docs/evidence/mutation-tables.md).
-const SURVIVORS_PERCENT: usize = 29;
+const SURVIVORS_PERCENT: usize = 3;
 
 #[test]
 #[ignore = "takes minutes; prints the tables of docs/evidence/mutation-tables.md"]

@@ -1,11 +1,15 @@
 //! Every generic value is bound to what holds it by the standard.
 
-use super::facts::{Binding, CYCLIC, OPPOSITES, PARAMETERS, SIGNALS, WORDS};
-use super::{Reporter, is_standard};
+use super::facts::{
+    ATTRIBUTES, AXIS_STATUS, Binding, CIA402_CAPTURES, CIA402_PROBES, CIA402_PROBING, CIA402_SAMPLES, CYCLIC,
+    CaptureFact, EVENTS, MODE_SLOTS, OF_THE_DRIVE, OPPOSITES, PARAMETERS, PROCEDURES, SERCOS_CAPTURES,
+    SERCOS_PROBES, SERCOS_PROBING, SERCOS_STATUS, SIGNALS, Trigger, WORDS,
+};
+use super::{Reporter, is_standard, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
-use crate::finding::registry::WRONG_BINDING;
-use crate::format::Name;
+use crate::finding::registry::{DIRECTION, WRONG_BINDING, WRONG_STATE};
+use crate::format::{FieldIs, FieldValueRow, Name};
 
 /// Which of the places of a binding.
 type Places = fn(&Binding) -> &'static [&'static str];
@@ -138,4 +142,243 @@ fn contradiction(one: &str, other: &str) -> Option<(&'static str, &'static str)>
     let pairs = OPPOSITES.iter().flat_map(|(left, right)| [(*left, *right), (*right, *left)]);
     let mut pairs = pairs.filter(|(left, right)| says(&one, left) && !says(&one, right));
     pairs.find(|(left, right)| says(other, right) && !says(other, left))
+}
+
+/// Elements, attributes and events of CIP Motion whose names say what they are.
+pub(super) fn cip_names(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().cip_generic;
+    let mut reporter = Reporter { source: &file.text, findings };
+    for row in &file.rows.attribute {
+        let attribute = row.attribute.get_ref();
+        let Some((_, right)) = ATTRIBUTES.iter().find(|(known, _)| known == attribute) else { continue };
+        for (key, bound) in [("parameter", &row.parameter), ("signal", &row.signal)] {
+            let Some(bound) = bound.as_ref().filter(|bound| bound.get_ref() != right) else { continue };
+            // What a vendor defines may stand for anything.
+            if ATTRIBUTES.iter().any(|(_, known)| known == bound.get_ref()) {
+                let what = [
+                    format!("`{attribute}` is bound to `{}`", bound.get_ref()),
+                    format!("expected `{right}`"),
+                    format!("write `{key} = \"{right}\"`"),
+                ];
+                reporter.report(WRONG_BINDING, (key, bound.span()), what);
+            }
+        }
+    }
+    for row in &file.rows.event {
+        let event = row.event.get_ref();
+        let Some((_, checking, trigger)) = EVENTS.iter().find(|(known, ..)| known == event) else { continue };
+        let mut keys = vec![("checking", Some(&row.checking), *checking)];
+        match trigger {
+            Trigger::Capture(capture, edge) => {
+                keys.push(("capture", row.capture.as_ref(), capture));
+                keys.push(("edge", row.edge.as_ref(), edge));
+            }
+            Trigger::Signal(signal) => keys.push(("signal", row.signal.as_ref(), signal)),
+        }
+        for (key, given, right) in keys {
+            let shown = given.map_or("nothing", |name| name.get_ref().as_str());
+            if shown == right {
+                continue;
+            }
+            let what = [
+                format!("the event `{event}` would come by `{key}` = `{shown}`"),
+                format!("expected `{right}`"),
+                format!("write `{key} = \"{right}\"`"),
+            ];
+            reporter.report(WRONG_BINDING, place_of(key, given, ("event", &row.event)), what);
+        }
+    }
+    for row in &file.rows.status {
+        let [status] = row.status.as_slice() else { continue };
+        let mode = row.mode.as_ref().map(|mode| mode.get_ref().as_str());
+        let bit = row.axis_status.get_ref();
+        let ways = || AXIS_STATUS.iter().filter(|(known, ..)| known == bit);
+        if ways().next().is_none() || ways().any(|(_, one, of)| one == status.get_ref() && *of == mode) {
+            continue;
+        }
+        let right: Vec<String> = ways()
+            .map(|(_, one, of)| {
+                format!("`{one}`{}", of.map(|of| format!(" in the mode `{of}`")).unwrap_or_default())
+            })
+            .collect();
+        let what = [
+            format!("`{bit}` would be set by `{}`", status.get_ref()),
+            format!("expected {}", right.join(" or ")),
+            "correct `status`, `mode` or `axis_status`".to_owned(),
+        ];
+        reporter.report(WRONG_STATE, ("axis_status", row.axis_status.span()), what);
+    }
+}
+
+/// Procedures, slots of modes, and edges that a SERCOS drive captures.
+pub(super) fn sercos_places(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().generic_sercos;
+    let rows = &file.rows;
+    let mut reporter = Reporter { source: &file.text, findings };
+    for row in &rows.procedure {
+        let of_row = |(mode, source, _): &&(&str, &str, &[&str])| {
+            row.mode.get_ref() == mode && row.interpolation.get_ref() == source
+        };
+        let Some((mode, source, right)) = PROCEDURES.iter().find(of_row) else { continue };
+        let given: Vec<&str> = row.commands.iter().map(|name| name.get_ref().as_str()).collect();
+        if given != *right && given.iter().all(|idn| is_standard(idn)) {
+            let listed: Vec<String> = right.iter().map(|idn| format!("\"{idn}\"")).collect();
+            let what = [
+                format!("the mode `{mode}` by the {source} executes other procedure commands"),
+                format!("expected {}, in this order", right.join(", ")),
+                format!("write `commands = [{}]`", listed.join(", ")),
+            ];
+            reporter.report(WRONG_BINDING, ("mode", row.mode.span()), what);
+        }
+    }
+    for row in &rows.mode_slot {
+        let slot = usize::try_from(*row.slot.get_ref()).ok();
+        let right = slot.and_then(|slot| MODE_SLOTS.get(slot));
+        let Some(right) = right.filter(|right| row.idn.get_ref() != *right) else { continue };
+        let what = [
+            format!(
+                "the mode in {} would be chosen as that of slot {}",
+                row.idn.get_ref(),
+                row.slot.get_ref()
+            ),
+            format!("the drive has the mode of this slot in {right}"),
+            format!("write `idn = \"{right}\"`"),
+        ];
+        reporter.report(WRONG_BINDING, ("slot", row.slot.span()), what);
+    }
+    for row in &rows.capture {
+        captured(&mut reporter, SERCOS_CAPTURES, (&row.capture, &row.edge), &row.pattern, row.value.as_ref());
+        let Some((_, enable)) = SERCOS_PROBES.iter().find(|(known, _)| known == row.capture.get_ref()) else {
+            continue;
+        };
+        for (key, given, right) in
+            [("enable", row.enable.as_ref(), *enable), ("command", row.command.as_ref(), SERCOS_PROBING)]
+        {
+            let Some(given) = given.filter(|given| given.get_ref() != right && is_standard(given.get_ref()))
+            else {
+                continue;
+            };
+            let what = [
+                format!("`{}` would be armed by {}", row.capture.get_ref(), given.get_ref()),
+                format!("{right} lets its edges through"),
+                format!("write `{key} = \"{right}\"`"),
+            ];
+            reporter.report(WRONG_BINDING, (key, given.span()), what);
+        }
+    }
+    for row in &rows.parameter {
+        direction(&mut reporter, &row.parameter, &row.idn, &row.direction);
+    }
+    let status = |word: &str, pattern: &[FieldValueRow]| {
+        let [field] = pattern else { return None };
+        SERCOS_STATUS.iter().find(|(known, name, _)| *known == word && name == field.field.get_ref())
+    };
+    for row in &rows.status {
+        let Some((word, field, right)) = status(row.word.get_ref(), &row.pattern) else { continue };
+        let set = row.pattern.iter().all(|field| matches!(field.is.get_ref(), FieldIs::Number(1)));
+        if row.status.get_ref() == right && set {
+            continue;
+        }
+        let what = [
+            format!("`{}` is taken from another bit of `{word}`", row.status.get_ref()),
+            format!("`{field}` = 1 shows `{right}`"),
+            format!("write `status = \"{right}\"`, or correct the field"),
+        ];
+        reporter.report(WRONG_STATE, ("status", row.status.span()), what);
+    }
+}
+
+/// Edges that a CiA 402 drive captures.
+pub(super) fn cia402_places(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().generic_cia402;
+    let mut reporter = Reporter { source: &file.text, findings };
+    for row in &file.rows.capture {
+        captured(&mut reporter, CIA402_CAPTURES, (&row.capture, &row.edge), &row.pattern, row.value.as_ref());
+        let probe = row.capture.get_ref().strip_prefix("registration_");
+        let own = row.function.as_ref().is_some_and(|object| object.get_ref() == CIA402_PROBING);
+        let Some(probe) = probe.filter(|_| own) else { continue };
+        let named = |text: &str| text.replace("{n}", probe).replace("{edge}", row.edge.get_ref());
+        let has = |list: &[FieldValueRow], name: &str, is: u32| {
+            let known = |field: &&FieldValueRow| field.field.get_ref() == name;
+            list.iter().find(known).is_some_and(|field| match field.is.get_ref() {
+                FieldIs::Number(number) => *number == is,
+                FieldIs::Name(_) => true,
+            })
+        };
+        let enables = CIA402_PROBES.iter().map(|(name, is)| (&row.enable, "enable", named(name), *is));
+        let selects = [(&row.select, "select", named(CIA402_SAMPLES), 1)];
+        for (_, key, name, is) in enables.chain(selects).filter(|(list, _, name, is)| !has(list, name, *is)) {
+            let what = [
+                format!("the {} edge of `{}` is armed otherwise", row.edge.get_ref(), row.capture.get_ref()),
+                format!("the drive is asked for it by `{name}` = {is}"),
+                format!("write `{{ field = \"{name}\", is = {is} }}` into `{key}`"),
+            ];
+            reporter.report(WRONG_STATE, ("edge", row.edge.span()), what);
+        }
+    }
+    for row in &file.rows.parameter {
+        direction(&mut reporter, &row.parameter, &row.object, &row.direction);
+    }
+}
+
+/// A parameter is read, and what is the drive's is not written.
+fn direction(reporter: &mut Reporter<'_>, parameter: &Name, place: &Name, direction: &Name) {
+    let name = parameter.get_ref().as_str();
+    let (given, own) = (direction.get_ref().as_str(), OF_THE_DRIVE.contains(&name));
+    if !is_standard(place.get_ref()) || given == "from_drive" || given == "both" && !own {
+        return;
+    }
+    let what = if own {
+        [
+            format!("`{name}` would be written into the drive"),
+            "it is what the drive shows, or how its motor and mechanics were set up with its own tool"
+                .to_owned(),
+            "write `direction = \"from_drive\"`".to_owned(),
+        ]
+    } else {
+        [
+            format!("`{name}` would never be read from the drive"),
+            "the controller reads back what the drive holds".to_owned(),
+            "write `direction = \"both\"`".to_owned(),
+        ]
+    };
+    reporter.report(DIRECTION, ("direction", direction.span()), what);
+}
+
+/// An edge: the field that tells it, and the position that was stored.
+fn captured(
+    reporter: &mut Reporter<'_>,
+    facts: &[CaptureFact],
+    (capture, edge): (&Name, &Name),
+    pattern: &[FieldValueRow],
+    value: Option<&Name>,
+) {
+    let of_row = |fact: &&CaptureFact| capture.get_ref() == fact.capture && edge.get_ref() == fact.edge;
+    let Some(fact) = facts.iter().find(of_row) else { return };
+    let known = |field: &FieldValueRow| facts.iter().any(|fact| field.field.get_ref() == fact.field);
+    let what = format!("the {} edge of `{}`", fact.edge, fact.capture);
+    let tells = |field: &FieldValueRow| {
+        field.field.get_ref() == fact.field
+            && matches!(field.is.get_ref(), FieldIs::Number(is) if *is == fact.is)
+    };
+    // A field that no fact has is the vendor's.
+    if !pattern.iter().any(tells) && (pattern.is_empty() || pattern.iter().any(known)) {
+        let what = [
+            format!("{what} is taken from something else"),
+            format!("the drive tells it by `{}` = {}", fact.field, fact.is),
+            format!("write `pattern = [{{ field = \"{}\", is = {} }}]`", fact.field, fact.is),
+        ];
+        reporter.report(WRONG_STATE, ("edge", edge.span()), what);
+    }
+    if let (Some(given), Some(right)) = (value, fact.value)
+        && is_standard(given.get_ref())
+        && given.get_ref() != right
+    {
+        let what = [
+            format!("{what} would have the position in {}", given.get_ref()),
+            format!("the drive stores it in {right}"),
+            format!("write `value = \"{right}\"`"),
+        ];
+        reporter.report(WRONG_BINDING, ("value", given.span()), what);
+    }
 }

@@ -3,11 +3,11 @@
 use profile_generic::program::BitPattern;
 use profile_generic::state::{Action, Report};
 
-use super::facts::CIA402_MODES;
+use super::facts::{CIA402_CONTROL, CIA402_MODES};
 use super::sercos_words::implies;
 use super::{Reporter, place_of};
 use crate::Mapping;
-use crate::cia402::Tells;
+use crate::cia402::{StatusRule, Tells};
 use crate::finding::Findings;
 use crate::finding::registry::{WRONG_ORDER, WRONG_STATE};
 
@@ -40,9 +40,20 @@ const STATES: &[(State, &str, u32, u32)] = &[
 
 const VOLTAGE: u32 = 1 << 4;
 const WARNING: u32 = 1 << 7;
+const REACHED: u32 = 1 << 10;
+const HOMING_ERROR: u32 = 1 << 13;
+const HOMING: u32 = HOMING_ERROR | FOLLOWS | REACHED;
+const BIT_4: u32 = 1 << 4;
 const FOLLOWS: u32 = 1 << 12;
 const HALT: u32 = 1 << 8;
 const RESET: u32 = 1 << 7;
+const QUICK_STOP: u32 = 1 << 2;
+
+/// Modes of operation: profile position, velocity of a frequency converter, profile velocity, interpolated position.
+const PP: i8 = 1;
+const VL: i8 = 2;
+const PV: i8 = 3;
+const IP: i8 = 7;
 
 /// Modes of operation in which bit 12 says whether the drive follows command values: csp, csv, cst.
 const CYCLIC: std::ops::RangeInclusive<i8> = 8..=10;
@@ -90,6 +101,8 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     reports(mapping, &mut reporter);
     status(mapping, &mut reporter);
     order(mapping, &mut reporter);
+    quick_stops(mapping, &mut reporter);
+    control(mapping, &mut reporter);
     modes(mapping, &mut reporter);
 }
 
@@ -147,13 +160,49 @@ fn reports(mapping: &Mapping, reporter: &mut Reporter<'_>) {
     }
 }
 
-/// Status bits, and the states in which they may be set.
-const STATUS: &[(&str, &[State])] = &[
-    ("enabled", &[Enabled]),
-    ("tracking", &[Enabled]),
-    ("ready", &[ReadyToSwitchOn, SwitchedOn]),
-    ("power", &[ReadyToSwitchOn, SwitchedOn, Enabled, QuickStop, Disabled]),
-    ("fault", &[Fault, FaultReaction]),
+/// A word of the drive, the mode that it shows, and what it tells by bits that not all drives keep.
+#[derive(Clone, Copy)]
+struct Case {
+    state: State,
+    word: u32,
+    mode: i8,
+    tells: Tells,
+}
+
+/// A status bit of 6041h: what shows it, in words, and whether a case does; `None` where the profile leaves it open.
+type Shown = (&'static str, &'static str, fn(Case) -> Option<bool>);
+
+const STATUS: &[Shown] = &[
+    ("enabled", "the state Operation enabled", |case| Some(case.state == Enabled)),
+    ("fault", "the state Fault or Fault reaction active", |case| {
+        Some(matches!(case.state, Fault | FaultReaction))
+    }),
+    ("warning", "bit 7 of 6041h", |case| Some(case.word & WARNING != 0)),
+    ("ready", "the state Ready to switch on or Switched on", |case| {
+        Some(matches!(case.state, ReadyToSwitchOn | SwitchedOn))
+    }),
+    ("power", "bit 4 where the drive tells by it, else a state from Ready to switch on", |case| {
+        match case.state {
+            _ if case.tells.voltage => Some(case.word & VOLTAGE != 0),
+            Disabled => None,
+            state => Some(matches!(state, ReadyToSwitchOn | SwitchedOn | Enabled | QuickStop)),
+        }
+    }),
+    (
+        "tracking",
+        "the state Operation enabled, and bit 12 in csp, csv, cst and ip where the drive has it",
+        |case| {
+            let told = matches!(case.mode, IP | 8..=10) && case.tells.follows;
+            Some(case.state == Enabled && (!told || case.word & FOLLOWS != 0))
+        },
+    ),
+    ("target_reached", "bit 10 in pp and Operation enabled", |case| {
+        Some(case.state == Enabled && case.mode == PP && case.word & REACHED != 0)
+    }),
+    ("at_velocity", "bit 10 in pv and vl", |case| {
+        Some(matches!(case.mode, PV | VL) && case.word & REACHED != 0)
+    }),
+    ("standstill", "bit 12 in pv", |case| Some(case.mode == PV && case.word & FOLLOWS != 0)),
 ];
 
 /// Bits of 60FDh.
@@ -161,37 +210,71 @@ const INPUTS: &[(&str, u32)] =
     &[("negative_limit_switch", 1 << 0), ("positive_limit_switch", 1 << 1), ("home_switch", 1 << 2)];
 
 fn status(mapping: &Mapping, reporter: &mut Reporter<'_>) {
-    let rows = &mapping.tables().generic_cia402.rows.status;
-    for (rule, row) in mapping.cia402.status.iter().zip(rows) {
+    let rows = &mapping.tables().generic_cia402.rows;
+    let rules = || mapping.cia402.status.iter().zip(&rows.status);
+    for (rule, row) in rules() {
         let name = row.status.get_ref().as_str();
         let input = INPUTS.iter().find(|(known, _)| rule.object.index == 0x60FD && *known == name);
-        let of_word = rule.object == mapping.cia402.words.status;
-        let wrong = if let Some((_, bit)) = input {
-            (rule.pattern != BitPattern::new(*bit, *bit))
-                .then(|| format!("bit {} of 60FDh", bit.trailing_zeros()))
-        } else if of_word && name == "warning" {
-            (!implies(rule.pattern, BitPattern::new(WARNING, WARNING))).then(|| "bit 7 of 6041h".to_owned())
-        } else if let Some((_, allowed)) = STATUS.iter().find(|(known, _)| of_word && *known == name) {
-            // With bit 4 the mains are seen in every state.
-            let by_voltage = name == "power" && implies(rule.pattern, BitPattern::new(VOLTAGE, VOLTAGE));
-            let other = STATES.iter().find(|(state, _, mask, value)| {
-                let clash = (rule.pattern.value ^ value) & rule.pattern.mask & mask != 0;
-                !clash && !allowed.contains(state)
-            });
-            let names: Vec<&str> = allowed.iter().map(|state| name_of(*state)).collect();
-            other.filter(|_| !by_voltage).map(|_| format!("the state {}", names.join(" or ")))
-        } else {
-            None
+        let Some((_, bit)) = input.filter(|(_, bit)| rule.pattern != BitPattern::new(*bit, *bit)) else {
+            continue;
         };
-        if let Some(wanted) = wrong {
+        let wanted = format!("bit {} of 60FDh", bit.trailing_zeros());
+        taken(reporter, name, &wanted, row.status.span());
+    }
+    let cases = cases();
+    for (name, why, shows) in STATUS {
+        let own: Vec<_> = rules()
+            .filter(|(rule, row)| rule.object == mapping.cia402.words.status && row.status.get_ref() == name)
+            .collect();
+        let fits = |rule: &StatusRule, case: &Case| {
+            rule.pattern.matches(case.word)
+                && (rule.modes.is_empty() || rule.modes.contains(&case.mode))
+                && rule.drives.include(case.tells)
+        };
+        let mut wrong = false;
+        for (rule, row) in &own {
+            if cases.iter().any(|case| shows(*case) == Some(false) && fits(rule, case)) {
+                wrong = true;
+                taken(reporter, name, why, row.status.span());
+            }
+        }
+        let missed =
+            |case: &&Case| shows(**case) == Some(true) && !own.iter().any(|(rule, _)| fits(rule, case));
+        if let Some(case) = cases.iter().find(missed).filter(|_| !wrong) {
             let what = [
-                format!("`{name}` is taken from something else"),
-                format!("expected {wanted}"),
-                "correct `state` or `pattern`".to_owned(),
+                format!("no row takes `{name}` from 6041h = {:04X} in mode {}", case.word, case.mode),
+                format!("the drive shows it by {why}"),
+                format!("add a [[status]] row of 6041h, with `status = \"{name}\"`"),
             ];
-            reporter.report(WRONG_STATE, ("status", row.status.span()), what);
+            reporter.report(WRONG_STATE, ("status", rows.words.status.span()), what);
         }
     }
+}
+
+/// A status bit that is taken from other bits than the standard's.
+fn taken(reporter: &mut Reporter<'_>, name: &str, wanted: &str, span: std::ops::Range<usize>) {
+    let what = [
+        format!("`{name}` is taken from something else"),
+        format!("expected {wanted}"),
+        "correct `state`, `pattern`, `modes`, `follows` or `voltage`".to_owned(),
+    ];
+    reporter.report(WRONG_STATE, ("status", span), what);
+}
+
+/// Every state with every bit beside it that a status bit follows from, in every mode and for every kind of drive.
+fn cases() -> Vec<Case> {
+    let bits = [VOLTAGE, WARNING, REACHED, FOLLOWS];
+    let mut cases = Vec::new();
+    for (state, _, _, value) in STATES {
+        for case in 0..1_u32 << (bits.len() + 2) {
+            let is = |bit: usize| case >> bit & 1 == 1;
+            let beside: u32 = (0..bits.len()).filter(|bit| is(*bit)).map(|bit| bits[bit]).sum();
+            let tells = Tells { follows: is(bits.len()), voltage: is(bits.len() + 1) };
+            let of_mode = |mode| Case { state: *state, word: value | beside, mode, tells };
+            cases.extend([PP, VL, PV, 4, IP, 8, 9, 10].map(of_mode));
+        }
+    }
+    cases
 }
 
 /// What an action has to come to in a state. `None`: nothing is expected.
@@ -200,7 +283,7 @@ fn expected(action: Action, state: State) -> Option<&'static [State]> {
         (Action::Enable | Action::Energize, Disabled) => &[ReadyToSwitchOn],
         (Action::Enable, ReadyToSwitchOn) => &[SwitchedOn],
         (Action::Enable, SwitchedOn | Enabled) => &[Enabled],
-        (Action::Enable, QuickStop) => &[Disabled, QuickStop],
+        (Action::Enable, QuickStop) => &[Disabled],
         (Action::Disable, Enabled) => &[SwitchedOn],
         (Action::Halt, Enabled) => &[Enabled],
         (Action::TorqueOff, ReadyToSwitchOn | SwitchedOn | Enabled | QuickStop) => &[Disabled],
@@ -230,7 +313,21 @@ fn order(mapping: &Mapping, reporter: &mut Reporter<'_>) {
         let fits = |rule: &crate::cia402::ActionRule| {
             rule.action == action && rule.when.is_none_or(|when| when.matches(word))
         };
-        let Some(at) = rules.iter().position(fits) else { continue };
+        let Some(at) = rules.iter().position(fits) else {
+            if expected(action, state).is_some() {
+                let what = [
+                    format!("no row says what `{action}` writes in `{name}`"),
+                    "the drive would be left as it is".to_owned(),
+                    format!("add an [[action]] row with `action = \"{action}\"` and without `when`"),
+                ];
+                reporter.report(
+                    WRONG_ORDER,
+                    ("mapping", mapping.tables().generic_cia402.rows.mapping.span()),
+                    what,
+                );
+            }
+            continue;
+        };
         let control = rules[at].pattern.apply(0);
         let reached = next(state, control);
         let Some(right) = expected(action, state) else { continue };
@@ -263,6 +360,75 @@ fn order(mapping: &Mapping, reporter: &mut Reporter<'_>) {
         };
         let help = "correct `send`, or put the row for this state before the general one".to_owned();
         reporter.report(WRONG_ORDER, place, [title, wanted, help]);
+    }
+}
+
+/// Bit 2 is low for a quick stop: a command that is none leaves it high.
+fn quick_stops(mapping: &Mapping, reporter: &mut Reporter<'_>) {
+    let rows = &mapping.tables().generic_cia402.rows.action;
+    for (rule, row) in mapping.cia402.actions.iter().zip(rows) {
+        let writes = rule.pattern.mask & QUICK_STOP != 0;
+        if !writes || implies(rule.pattern, BitPattern::new(QUICK_STOP, QUICK_STOP)) {
+            continue;
+        }
+        let what = [
+            format!("`{}` writes bit 2 of 6040h as 0", rule.action),
+            "that is the bit of a quick stop, which nobody asks for".to_owned(),
+            "write `pattern = [{ field = \"Quick stop\", is = 1 }]`".to_owned(),
+        ];
+        reporter.report(WRONG_ORDER, place_of("send", row.send.as_ref(), ("action", &row.action)), what);
+    }
+}
+
+/// Bits of 6040h that a mode needs.
+fn control(mapping: &Mapping, reporter: &mut Reporter<'_>) {
+    let rows = &mapping.tables().generic_cia402.rows.mode;
+    for (rule, row) in mapping.cia402.modes.iter().zip(rows) {
+        for name in &row.modes {
+            let fact = CIA402_CONTROL.iter().find(|(known, ..)| known == name.get_ref());
+            let Some((mode, mask, value, why)) = fact else { continue };
+            if implies(rule.control, BitPattern::new(*mask, *value)) {
+                continue;
+            }
+            let what = [
+                format!("the mode `{mode}` has other bits in 6040h"),
+                format!("expected that {why}"),
+                "correct `control`".to_owned(),
+            ];
+            reporter.report(WRONG_ORDER, ("modes", name.span()), what);
+        }
+        // Bit 4 asks for the target of pp, and bit 12 says that it was taken.
+        let Some(handshake) = &rule.handshake else { continue };
+        if handshake.ask != BitPattern::new(BIT_4, BIT_4)
+            || handshake.taken != BitPattern::new(FOLLOWS, FOLLOWS)
+        {
+            let what = [
+                format!("the targets of the mode `{}` are handed over by other bits", row.mode.get_ref()),
+                "expected bit 4 of 6040h (new set-point), answered by bit 12 of 6041h".to_owned(),
+                "correct `ask` and `taken` of `handshake`".to_owned(),
+            ];
+            reporter.report(WRONG_ORDER, ("mode", row.mode.span()), what);
+        }
+    }
+    let rows = &mapping.tables().generic_cia402.rows.procedure;
+    for (rule, row) in mapping.cia402.procedures.iter().zip(rows) {
+        let homes = row.modes.iter().any(|name| name.get_ref() == "hm");
+        // Bits 13, 12 and 10: completed, and errors moving and at rest.
+        let done = BitPattern::new(HOMING, FOLLOWS | REACHED);
+        let mut failed: Vec<u32> = rule.failed.iter().map(|pattern| pattern.value).collect();
+        failed.sort_unstable();
+        let right = rule.start == BitPattern::new(BIT_4, BIT_4)
+            && rule.done == done
+            && failed == [HOMING_ERROR, HOMING_ERROR | REACHED];
+        if homes && !right {
+            let what = [
+                format!("the mode `{}` starts or ends by other bits", row.mode.get_ref()),
+                "expected bit 4 of 6040h to start hm; in 6041h bits 12 and 10 for the end, and bit 13 for an error"
+                    .to_owned(),
+                "correct `start`, `done` or `failed`".to_owned(),
+            ];
+            reporter.report(WRONG_ORDER, ("mode", row.mode.span()), what);
+        }
     }
 }
 

@@ -1,10 +1,10 @@
 //! The words of CIP Motion: what a request asks for, and what a state is shown as.
 
-use super::facts::{AXIS_STATES, CONTROL_MODES, DRIVE_ACTIONS, REQUESTS};
+use super::facts::{AXIS_STATES, CONTROL_MODES, DRIVE_ACTIONS, REQUESTS, STOPPINGS};
 use super::{Reporter, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
-use crate::finding::registry::{REQUEST_LOST, WRONG_STATE};
+use crate::finding::registry::{REQUEST_LOST, WRONG_ORDER, WRONG_STATE};
 use crate::format::Name;
 
 pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
@@ -45,6 +45,7 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
             reporter.report(WRONG_STATE, ("state", row.state.span()), what);
         }
     }
+    stoppings(mapping, &mut reporter);
     for row in &rows.mode {
         let fact = CONTROL_MODES.iter().find(|(control, _)| control == row.control_mode.get_ref());
         let Some((control, mode)) = fact.filter(|(_, mode)| mode != row.mode.get_ref()) else { continue };
@@ -54,6 +55,38 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
             format!("write `mode = \"{mode}\"`"),
         ];
         reporter.report(WRONG_STATE, ("mode", row.mode.span()), what);
+    }
+}
+
+/// How an axis is stopped.
+fn stoppings(mapping: &Mapping, reporter: &mut Reporter<'_>) {
+    for row in &mapping.tables().cip_generic.rows.stopping {
+        let name = row.stopping_action.get_ref();
+        let Some((_, method, holds, abort)) = STOPPINGS.iter().find(|(known, ..)| known == name) else {
+            continue;
+        };
+        for (key, given, right) in [("method", &row.method, method), ("abort", &row.abort, abort)] {
+            if given.get_ref() == right {
+                continue;
+            }
+            let what = [
+                format!("`{name}` would stop the axis by `{}`", given.get_ref()),
+                format!("expected `{right}`"),
+                format!("write `{key} = \"{right}\"`"),
+            ];
+            reporter.report(WRONG_ORDER, (key, given.span()), what);
+        }
+        if row.holds != *holds {
+            let what = [
+                format!(
+                    "`{name}` would {} the axis with torque at rest",
+                    if row.holds { "hold" } else { "not hold" }
+                ),
+                format!("expected `holds = {holds}`, as its name says"),
+                format!("write `holds = {holds}`"),
+            ];
+            reporter.report(WRONG_ORDER, ("stopping_action", row.stopping_action.span()), what);
+        }
     }
 }
 

@@ -265,6 +265,9 @@ pub(super) const REQUESTS: &[(&str, Option<&str>, &str)] = &[
     ("Abort Request", Some("abort"), "Abort Acknowledge"),
     ("Fault Reset Request", Some("fault_reset"), "Fault Reset Acknowledge"),
     ("Stop Process Request", Some("test_stop"), "Stop Process Acknowledge"),
+    ("Change Actual Position Reference Request", None, "Change Actual Position Reference Acknowledge"),
+    ("Change Command Position Reference Request", None, "Change Command Position Reference Acknowledge"),
+    ("Cancel Request", None, "Cancel Acknowledge"),
 ];
 
 /// What the axis state machine of a CIP device asks of a drive (5-2.6).
@@ -313,3 +316,621 @@ pub(super) const SERCOS_MODES: &[(&str, bool, &str)] = &[
     ("velocity", false, "Velocity control"),
     ("torque", false, "Torque control"),
 ];
+
+/// Set-points that the controller makes, and the value that shows where the axis is: a drive that lacks one cannot be used in the mode.
+/// What is added inside the drive (offsets) and the deceleration of a profile, for which drives take the acceleration, may be missing.
+pub(super) const REQUIRED: &[&str] = &[
+    "position_command",
+    "velocity_command",
+    "torque_command",
+    "target_position",
+    "profile_velocity",
+    "profile_acceleration",
+    "position_actual",
+];
+
+/// What every SERCOS drive shows as well; the gateway takes it from the position of a CiA 402 drive without it.
+pub(super) const REQUIRED_OF_SERCOS: &str = "velocity_actual";
+
+/// The mode of a frequency converter, which may have no encoder: its velocity is what shows that it turns.
+pub(super) const WITHOUT_ENCODER: (&str, &str) = ("vl", "velocity_actual");
+
+/// Steps of commissioning after which the axis is another one when the drive refuses: the mode of operation, and what the
+/// configuration limits.
+pub(super) const MODE_STEPS: &[&str] = &["write_modes", "write_mode"];
+pub(super) const LIMITS: &[&str] = &[
+    "position_limit_positive",
+    "position_limit_negative",
+    "velocity_limit_positive",
+    "velocity_limit_negative",
+    "acceleration_limit",
+    "deceleration_limit",
+    "torque_limit_positive",
+    "torque_limit_negative",
+    "position_error_tolerance",
+];
+
+/// The one element of the Actual Data Set that is there with every drive (Table 6-2.21): of one that is gone, the last position.
+pub(super) const ALWAYS_THERE: &str = "Actual Position";
+
+/// How a Stopping Action of CIP Motion stops (Table 5-2.54): the method, whether the axis is held then, and the strongest
+/// stop that an Abort request may make of it.
+pub(super) const STOPPINGS: &[(&str, &str, bool, &str)] = &[
+    ("Disable & Coast", "coast", false, "coast_and_disable"),
+    ("Current Decel & Disable", "decelerate", false, "decelerate_and_disable"),
+    ("Ramped Decel & Disable", "ramp", false, "decelerate_and_disable"),
+    ("Current Decel & Hold", "decelerate", true, "hold_position"),
+    ("Ramped Decel & Hold", "ramp", true, "hold_position"),
+];
+
+/// The fault of CIP Motion that stands for a cause, by the texts of Tables 5-2.65 (exceptions), 5-2.6 (node faults), 5-2.72
+/// (initialization faults) and 5-2.76 (APR faults): the key of the row, and the name. Other causes have no name in the standard.
+pub(super) const CIP_FAULTS: &[(&str, &str, &str)] = &[
+    ("motor_over_current", "exception", "Motor Overcurrent"),
+    ("motor_short_circuit", "exception", "Motor Overcurrent"),
+    ("commutation", "exception", "Motor Commutation"),
+    ("motor_over_speed", "exception", "Motor Overspeed FL"),
+    ("motor_over_speed_user_limit", "exception", "Motor Overspeed UL"),
+    ("motor_over_temperature", "exception", "Motor Overtemperature FL"),
+    ("motor_over_temperature_user_limit", "exception", "Motor Overtemperature UL"),
+    ("motor_overload", "exception", "Motor Thermal Overload FL"),
+    ("motor_overload_user_limit", "exception", "Motor Thermal Overload UL"),
+    ("motor_phase_loss", "exception", "Motor Phase Loss"),
+    ("over_torque", "exception", "Overtorque Limit"),
+    ("under_torque", "exception", "Undertorque Limit"),
+    ("over_current", "exception", "Inverter Overcurrent"),
+    ("drive_over_temperature", "exception", "Inverter Overtemperature FL"),
+    ("drive_over_temperature_user_limit", "exception", "Inverter Overtemperature UL"),
+    ("drive_overload", "exception", "Inverter Thermal Overload FL"),
+    ("drive_overload_user_limit", "exception", "Inverter Thermal Overload UL"),
+    ("ground_current", "exception", "Converter Ground Current FL"),
+    ("over_voltage", "exception", "Bus Overvoltage FL"),
+    ("over_voltage_user_limit", "exception", "Bus Overvoltage UL"),
+    ("under_voltage", "exception", "Bus Undervoltage FL"),
+    ("under_voltage_user_limit", "exception", "Bus Undervoltage UL"),
+    ("power_loss", "exception", "Bus Power Loss"),
+    ("mains_loss", "exception", "Converter AC Power Loss"),
+    ("mains_phase_loss", "exception", "Converter AC Single Phase Loss"),
+    ("mains_short_circuit", "exception", "Converter AC Phase Short"),
+    ("pre_charge", "exception", "Converter Pre-Charge Failure"),
+    ("bus_regulator", "exception", "Bus Regulator Failure"),
+    ("bus_regulator_overload", "exception", "Bus Regulator Thermal Overload FL"),
+    ("bus_fuse", "exception", "Bus Power Blown Fuse"),
+    ("bus_sharing", "exception", "Bus Power Sharing"),
+    ("bus_leakage", "exception", "Bus Power Leakage"),
+    ("converter_over_current", "exception", "Converter Overcurrent"),
+    ("converter_over_temperature", "exception", "Converter Overtemperature FL"),
+    ("converter_overload", "exception", "Converter Thermal Overload FL"),
+    ("feedback_loss", "exception", "Feedback Signal Loss FL"),
+    ("feedback_noise", "exception", "Feedback Signal Noise FL"),
+    ("feedback_data_loss", "exception", "Feedback Data Loss FL"),
+    ("feedback_device", "exception", "Feedback Device Failure"),
+    ("excessive_position_error", "exception", "Excessive Position Error"),
+    ("excessive_velocity_error", "exception", "Excessive Velocity Error"),
+    ("hardware_overtravel_positive", "exception", "Hardware Overtravel Positive"),
+    ("hardware_overtravel_negative", "exception", "Hardware Overtravel Negative"),
+    ("software_overtravel_positive", "exception", "Position Overtravel Positive"),
+    ("software_overtravel_negative", "exception", "Position Overtravel Negative"),
+    ("brake_slip", "exception", "Brake Slip"),
+    ("enable_input_lost", "exception", "Enable Input Deactivated"),
+    ("external_input", "exception", "External Exception Input"),
+    ("controller_abort", "exception", "Controller Initiated Exception"),
+    ("illegal_mode", "exception", "Illegal Control Mode"),
+    ("command_lost", "node_fault", "Control Connection Update Fault"),
+    ("synchronization_loss", "node_fault", "Clock Sync Fault"),
+    ("time_stamp", "node_fault", "Clock Skew Fault"),
+    ("data_format", "node_fault", "Data Format Error"),
+    ("connection_closed", "node_fault", "Control Connection Loss Fault"),
+    ("duplicate_address", "node_fault", "Duplicate Address"),
+    ("processor_watchdog", "node_fault", "Processor Watchdog Fault"),
+    ("node_hardware", "node_fault", "Hardware Fault"),
+    ("memory", "initialization", "Nonvolatile Memory Checksum Fault"),
+    ("self_test", "initialization", "Main Block Checksum Fault"),
+    ("absolute_position_lost", "apr", "Feedback Integrity Loss"),
+];
+
+/// Bits of S-0-0011 and S-0-0012, and what they say is wrong.
+pub(super) const SERCOS_FAULTS: &[(&str, &str)] = &[
+    ("Overload shut-down", "motor_overload"),
+    ("Amplifier overtemperature shut-down", "drive_over_temperature"),
+    ("Motor overtemperature shut-down", "motor_over_temperature"),
+    ("Cooling error shut-down", "cooling"),
+    ("Control voltage error", "control_voltage"),
+    ("Feedback error", "feedback_loss"),
+    ("Commutation error", "commutation"),
+    ("Overcurrent error", "over_current"),
+    ("Overvoltage error", "over_voltage"),
+    ("Undervoltage error", "under_voltage"),
+    ("Power supply phase error", "mains_phase_loss"),
+    ("Excessive position deviation", "excessive_position_error"),
+    ("Communication error", "communication_loss"),
+    ("Overtravel limit exceeded", "software_overtravel_positive"),
+    ("Manufacturer specific error", "drive_specific"),
+    ("Overload warning", "motor_overload_user_limit"),
+    ("Amplifier overtemperature warning", "drive_over_temperature_user_limit"),
+    ("Motor overtemperature warning", "motor_over_temperature_user_limit"),
+    ("Cooling error warning", "cooling_warning"),
+    ("Positioning velocity above limit", "velocity_command_warning"),
+    ("Undervoltage warning", "under_voltage_user_limit"),
+    ("Target position outside of travel range", "position_command_warning"),
+    ("Manufacturer specific warning", "drive_warning"),
+];
+
+/// Classes of the error codes of 603Fh, and what is wrong by them where the code says no more.
+pub(super) const CLASSES: &[(&str, &str)] = &[
+    ("Current", "over_current"),
+    ("Current, input side", "over_current"),
+    ("Current, inside the device", "over_current"),
+    ("Current, output side", "over_current"),
+    ("Mains voltage", "mains_loss"),
+    ("DC link voltage", "over_voltage"),
+    ("Temperature", "drive_over_temperature"),
+    ("Ambient temperature", "drive_over_temperature"),
+    ("Device temperature", "drive_over_temperature"),
+    ("Drive temperature", "drive_over_temperature"),
+    ("Device hardware", "internal"),
+    ("Device software", "internal"),
+    ("Internal software", "internal"),
+    ("User software", "internal"),
+    ("Data set", "parameter"),
+    ("Communication", "communication_loss"),
+    ("Protocol", "communication_loss"),
+    ("Velocity control", "excessive_velocity_error"),
+    ("Position control", "excessive_position_error"),
+    ("Positioning", "excessive_position_error"),
+    ("Supply temperature", "drive_over_temperature"),
+    ("Additional modules", "drive_specific"),
+    ("Monitoring", "drive_specific"),
+    ("Additional functions", "drive_specific"),
+    ("External error", "external_input"),
+    ("Output voltage", "drive_specific"),
+    ("Voltage", "drive_specific"),
+    ("Torque control", "drive_specific"),
+    ("Generic error", "drive_specific"),
+    ("Device specific", "drive_specific"),
+];
+
+/// Axis Status bits of CIP Motion (Tables 5-2.60 and 5-2.61): the bit, and the generic bits and the mode that it shows, each
+/// line one way to come to it.
+pub(super) const AXIS_STATUS: &[(&str, &str, Option<&str>)] = &[
+    ("Alarm", "warning", None),
+    ("DC Bus Up", "power", None),
+    ("Power Structure Enabled", "enabled", None),
+    ("Tracking Command", "tracking", None),
+    ("Position Lock", "in_position", None),
+    ("Velocity Lock", "at_velocity", None),
+    ("Velocity Standstill", "standstill", None),
+    ("Velocity Limit", "velocity_limit", None),
+    ("Acceleration Limit", "acceleration_limit", None),
+    ("Torque Limit", "torque_limit", None),
+    ("Current Limit", "current_limit", None),
+    ("Feedback Integrity", "ready", None),
+    ("Feedback Integrity", "enabled", None),
+    ("Shutdown", "shutdown", None),
+    ("Position Control Mode", "enabled", Some("position")),
+    ("Velocity Control Mode", "enabled", Some("velocity")),
+    ("Torque Control Mode", "enabled", Some("torque")),
+];
+
+/// What brings an event.
+pub(super) enum Trigger {
+    Capture(&'static str, &'static str),
+    Signal(&'static str),
+}
+
+use Trigger::{Capture, Signal};
+
+/// Events of CIP Motion (Table 6-2.47) with their bits of Event Checking Control (Table 5-2.36), and what brings them. The first sign
+/// of a home switch and marker is the edge of the switch, the second that of the marker.
+pub(super) const EVENTS: &[(&str, &str, Trigger)] = &[
+    ("Registration 1 Positive Edge", "Reg 1 Pos Edge", Capture("registration_1", "positive")),
+    ("Registration 1 Negative Edge", "Reg 1 Neg Edge", Capture("registration_1", "negative")),
+    ("Registration 2 Positive Edge", "Reg 2 Pos Edge", Capture("registration_2", "positive")),
+    ("Registration 2 Negative Edge", "Reg 2 Neg Edge", Capture("registration_2", "negative")),
+    ("Marker Positive Edge", "Marker Pos Edge", Capture("marker", "positive")),
+    ("Marker Negative Edge", "Marker Neg Edge", Capture("marker", "negative")),
+    ("Home Switch Positive Edge", "Home Switch Pos Edge", Capture("home_switch", "positive")),
+    ("Home Switch Negative Edge", "Home Switch Neg Edge", Capture("home_switch", "negative")),
+    ("Home Switch-Marker ++", "Home Switch-Marker ++", Capture("home_switch_marker_positive", "positive")),
+    ("Home Switch-Marker +-", "Home Switch-Marker +-", Capture("home_switch_marker_negative", "positive")),
+    ("Home Switch-Marker -+", "Home Switch-Marker -+", Capture("home_switch_marker_positive", "negative")),
+    ("Home Switch-Marker --", "Home Switch-Marker --", Capture("home_switch_marker_negative", "negative")),
+    ("Home Torque Threshold", "Home Torque Threshold", Signal("torque_actual")),
+    ("Watch 1 Position Forward", "Watch Position 1 Fwd", Signal("position_actual")),
+    ("Watch 1 Position Reverse", "Watch Position 1 Rev", Signal("position_actual")),
+    ("Watch 2 Position Forward", "Watch Position 2 Fwd", Signal("position_actual")),
+    ("Watch 2 Position Reverse", "Watch Position 2 Rev", Signal("position_actual")),
+];
+
+/// Attributes of CIP Motion whose names say which generic value they are (Tables 5-2.38 to 5-2.57 and 5-2.20 to 5-2.25).
+pub(super) const ATTRIBUTES: &[(&str, &str)] = &[
+    ("Fine Command Position", "position_command"),
+    ("Fine Command Velocity", "velocity_command"),
+    ("Fine Command Acceleration", "acceleration_command"),
+    ("Position Command", "position_command"),
+    ("Position Trim", "position_offset"),
+    ("Position Reference", "position_command"),
+    ("Position Feedback", "position_actual"),
+    ("Position Error", "following_error"),
+    ("Velocity Command", "velocity_command"),
+    ("Velocity Trim", "velocity_offset"),
+    ("Velocity Feedback", "velocity_actual"),
+    ("Acceleration Command", "acceleration_command"),
+    ("Acceleration Feedback", "acceleration_actual"),
+    ("Torque Command", "torque_command"),
+    ("Torque Trim", "torque_offset"),
+    ("Output Current", "current_actual"),
+    ("Output Voltage", "output_voltage"),
+    ("Output Frequency", "output_frequency"),
+    ("Output Power", "output_power"),
+    ("DC Bus Voltage", "bus_voltage"),
+    ("DC Bus Voltage - Nominal", "bus_nominal_voltage"),
+    ("Digital Inputs", "digital_inputs"),
+    ("Motor Temperature", "temperature"),
+    ("Inverter Temperature", "drive_temperature"),
+    ("Motor Capacity", "motor_capacity"),
+    ("Inverter Capacity", "drive_capacity"),
+    ("Kvff", "velocity_feed_forward_gain"),
+    ("Kpp", "position_loop_gain"),
+    ("Kpi", "position_integral_gain"),
+    ("Kaff", "acceleration_feed_forward_gain"),
+    ("Kvp", "velocity_loop_gain"),
+    ("Position Lock Tolerance", "in_position_window"),
+    ("Position Error Tolerance", "position_error_tolerance"),
+    ("Position Error Tolerance Time", "position_error_tolerance_time"),
+    ("Position Limit - Positive", "position_limit_positive"),
+    ("Position Limit - Negative", "position_limit_negative"),
+    ("Velocity Error Tolerance", "velocity_error_tolerance"),
+    ("Velocity Error Tolerance Time", "velocity_error_tolerance_time"),
+    ("Velocity Lock Tolerance", "at_velocity_window"),
+    ("Velocity Standstill Window", "standstill_window"),
+    ("Velocity Limit - Positive", "velocity_limit_positive"),
+    ("Velocity Limit - Negative", "velocity_limit_negative"),
+    ("Acceleration Limit", "acceleration_limit"),
+    ("Deceleration Limit", "deceleration_limit"),
+    ("Torque Limit - Positive", "torque_limit_positive"),
+    ("Torque Limit - Negative", "torque_limit_negative"),
+    ("Torque Rate Limit", "torque_rate_limit"),
+    ("Overtorque Limit", "over_torque_limit"),
+    ("Overtorque Limit Time", "over_torque_limit_time"),
+    ("Stopping Torque", "stopping_torque"),
+    ("Stopping Time Limit", "stopping_time_limit"),
+    ("Coasting Time Limit", "coasting_time_limit"),
+    ("Zero Speed Time", "zero_speed_time"),
+    ("Mechanical Brake Release Delay", "brake_release_time"),
+    ("Mechanical Brake Engage Delay", "brake_engage_time"),
+    ("Motor Rated Voltage", "motor_rated_voltage"),
+    ("Motor Rated Continuous Current", "motor_rated_current"),
+    ("Motor Rated Peak Current", "motor_peak_current"),
+    ("Motor Rated Output Power", "motor_rated_power"),
+    ("Motor Overload Limit", "motor_overload_limit"),
+    ("Motor Max Winding Temperature", "motor_max_temperature"),
+    ("PM Motor Resistance", "motor_resistance"),
+    ("PM Motor Inductance", "motor_inductance"),
+    ("PM Motor Rated Torque", "motor_rated_torque"),
+    ("Rotary Motor Poles", "motor_pole_count"),
+    ("Rotary Motor Inertia", "motor_inertia"),
+    ("Rotary Motor Rated Speed", "motor_rated_velocity"),
+    ("Rotary Motor Max Speed", "motor_max_velocity"),
+];
+
+/// Bits of S-0-0013 in the telegram, and what they show.
+pub(super) const SERCOS_STATUS: &[(&str, &str, &str)] = &[
+    ("Class 3 diagnostic", "Velocity feedback equals command", "at_velocity"),
+    ("Class 3 diagnostic", "Velocity feedback is zero", "standstill"),
+    ("Class 3 diagnostic", "Torque at limit", "torque_limit"),
+    ("Class 3 diagnostic", "Velocity command above limit", "velocity_limit"),
+    ("Class 3 diagnostic", "In position", "in_position"),
+    ("Class 3 diagnostic", "Target position attained", "target_reached"),
+    ("Home switch", "Home switch active", "home_switch"),
+];
+
+/// Where drives have the edges of probes and switches: capture and edge, the field and its value that show the edge, and the
+/// value of the position; by IDN, and by object.
+pub(super) struct CaptureFact {
+    pub capture: &'static str,
+    pub edge: &'static str,
+    pub field: &'static str,
+    pub is: u32,
+    pub value: Option<&'static str>,
+}
+
+const fn edge(
+    capture: &'static str,
+    edge: &'static str,
+    field: &'static str,
+    is: u32,
+    value: Option<&'static str>,
+) -> CaptureFact {
+    CaptureFact { capture, edge, field, is, value }
+}
+
+pub(super) const SERCOS_CAPTURES: &[CaptureFact] = &[
+    edge("registration_1", "positive", "Probe 1 positive latched", 1, Some("S-0-0130")),
+    edge("registration_1", "negative", "Probe 1 negative latched", 1, Some("S-0-0131")),
+    edge("registration_2", "positive", "Probe 2 positive latched", 1, Some("S-0-0132")),
+    edge("registration_2", "negative", "Probe 2 negative latched", 1, Some("S-0-0133")),
+    edge("home_switch", "positive", "Home switch active", 1, None),
+    edge("home_switch", "negative", "Home switch active", 0, None),
+];
+
+pub(super) const CIA402_CAPTURES: &[CaptureFact] = &[
+    edge("registration_1", "positive", "Positive edge stored 1", 1, Some("60BA:00")),
+    edge("registration_1", "negative", "Negative edge stored 1", 1, Some("60BB:00")),
+    edge("registration_2", "positive", "Positive edge stored 2", 1, Some("60BC:00")),
+    edge("registration_2", "negative", "Negative edge stored 2", 1, Some("60BD:00")),
+    edge("home_switch", "positive", "Home switch", 1, None),
+    edge("home_switch", "negative", "Home switch", 0, None),
+];
+
+/// The procedures of homing: who makes the way, and the commands of the drive.
+pub(super) const PROCEDURES: &[(&str, &str, &[&str])] =
+    &[("homing", "drive", &["S-0-0148"]), ("homing", "controller", &["S-0-0146", "S-0-0171", "S-0-0172"])];
+
+/// The IDN of the operation mode that bits 10 to 8 of control and status word choose.
+pub(super) const MODE_SLOTS: &[&str] =
+    &["S-0-0032", "S-0-0033", "S-0-0034", "S-0-0035", "S-0-0284", "S-0-0285", "S-0-0286", "S-0-0287"];
+
+/// What commissioning writes into a drive as a number: scaling types, preferential factors, both edges of the probes; the drive's
+/// reactions to the loss of torque, halt, quick stop and the master.
+pub(super) const WRITES: &[(&str, &[i64])] = &[
+    ("S-0-0076", &[0x42, 0xC2, 0x41]),
+    ("S-0-0079", &[3_600_000]),
+    ("S-0-0103", &[1_843_200_000]),
+    ("S-0-0044", &[0x42, 0x41]),
+    ("S-0-0160", &[0x42, 0x41]),
+    ("S-0-0086", &[0]),
+    ("S-0-0169", &[0x3, 0xF]),
+    ("60C0:00", &[0]),
+    ("605C:00", &[1]),
+    ("605D:00", &[1]),
+    ("605A:00", &[2]),
+    ("6007:00", &[3]),
+];
+
+/// Steps of commissioning without which an axis does not know its drive.
+pub(super) const SERCOS_STEPS: &[&str] = &[
+    "command",
+    "write_modes",
+    "read_scaling",
+    "read_telegram",
+    "read_parameters",
+    "read_procedures",
+    "read_captures",
+];
+pub(super) const CIA402_STEPS: &[&str] =
+    &["read_scaling", "write_cycle", "read_parameters", "read_captures", "write_mode"];
+
+/// What the configuration of an axis says of its drive, and commissioning writes.
+pub(super) const SERCOS_WRITTEN: &[&str] = &[
+    "in_position_window",
+    "position_error_tolerance",
+    "acceleration_limit",
+    "deceleration_limit",
+    "torque_limit_positive",
+    "torque_limit_negative",
+];
+pub(super) const CIA402_WRITTEN: &[&str] = &[
+    "in_position_window",
+    "position_error_tolerance",
+    "velocity_limit_positive",
+    "torque_limit_positive",
+    "torque_limit_negative",
+];
+
+/// Bits of 6040h that a mode of operation needs while it follows: the mode, the bits that count, their values, and why.
+pub(super) const CIA402_CONTROL: &[(&str, u32, u32, &str)] = &[
+    (
+        "pp",
+        0x260,
+        0x020,
+        "bit 5 (change set immediately) is 1, and bits 6 (relative) and 9 (change on set-point) are 0",
+    ),
+    ("ip", 0x010, 0x010, "bit 4 (enable interpolation) is 1"),
+    ("vl", 0x070, 0x070, "bits 4, 5 and 6 (enable, unlock and reference of the ramp) are 1"),
+];
+
+/// Bits of Axis Exceptions - Mfg and Start Inhibits - Mfg, and the codes of Event Status: the assignment of the product, on which
+/// programs of controllers and the texts of the documentation rely.
+pub(super) const OWN_FAULTS: &[(&str, u32)] = &[
+    ("drive_specific", 1),
+    ("motor_stalled", 2),
+    ("control_voltage", 3),
+    ("cooling", 4),
+    ("feedback_mismatch", 5),
+    ("position_command_limit", 6),
+    ("velocity_command_limit", 7),
+    ("acceleration_command_limit", 8),
+    ("homing", 9),
+    ("standstill_movement", 10),
+    ("brake", 11),
+    ("start_time_out", 12),
+    ("stop_time_out", 13),
+    ("unexpected_torque", 14),
+    ("left_operation", 15),
+    ("communication_loss", 16),
+    ("south_silence", 17),
+    ("bus_phase", 18),
+    ("configuration", 19),
+    ("parameter", 20),
+    ("wrong_device", 21),
+    ("internal", 22),
+    ("conversion_saturated", 23),
+    ("safe_torque_off", 24),
+    ("safe_stop", 25),
+    ("safe_motion_limit", 26),
+    ("safe_feedback", 27),
+    ("safety_core", 28),
+    ("drive_warning", 29),
+    ("cooling_warning", 30),
+    ("position_command_warning", 31),
+    ("velocity_command_warning", 32),
+];
+pub(super) const OWN_INHIBITS: &[(&str, u32)] = &[
+    ("no_power", 1),
+    ("configuration_incomplete", 2),
+    ("not_homed", 3),
+    ("no_controller", 4),
+    ("no_drive", 5),
+    ("not_synchronized", 6),
+    ("no_operating_mode", 7),
+    ("local_control", 8),
+    ("transfer_active", 9),
+    ("brake", 10),
+    ("restart_delay", 11),
+    ("drive_specific", 12),
+    ("limit_switches_not_told", 13),
+];
+pub(super) const OWN_EVENT_STATUS: &[(&str, u8)] =
+    &[("captured", 0), ("not_supported", 1), ("busy", 2), ("failed", 3), ("ambiguous", 4)];
+
+/// Start Inhibits of the standard (Table 5-2.74).
+pub(super) const INHIBITS: &[(&str, &str)] = &[
+    ("safety", "Safe Torque Off Active"),
+    ("hardware_enable", "Axis Enable Input"),
+    ("motor_not_configured", "Motor Not Configured"),
+    ("feedback_not_configured", "Feedback Not Configured"),
+    ("commutation_not_configured", "Commutation Not Configured"),
+];
+
+/// Parameters that are the drive's: what it shows, and how motor and mechanics were set up in it.
+pub(super) const OF_THE_DRIVE: &[&str] = &[
+    "motor_rated_current",
+    "motor_peak_current",
+    "motor_rated_torque",
+    "gear_ratio_numerator",
+    "gear_ratio_denominator",
+    "following_error",
+    "torque_actual",
+    "load_position_actual",
+    "velocity_error",
+    "bus_voltage",
+    "motor_temperature",
+    "drive_temperature",
+    "homed",
+];
+
+/// By what a SERCOS drive lets an edge through: the enable of each probe, and the procedure of both.
+pub(super) const SERCOS_PROBES: &[(&str, &str)] =
+    &[("registration_1", "S-0-0405"), ("registration_2", "S-0-0406")];
+pub(super) const SERCOS_PROBING: &str = "S-0-0170";
+
+/// By what a CiA 402 drive does: fields of 60B8h and their values, `{n}` the probe and `{edge}` the edge.
+pub(super) const CIA402_PROBING: &str = "60B8:00";
+pub(super) const CIA402_PROBES: &[(&str, u32)] =
+    &[("Enable touch probe {n}", 1), ("Continuous {n}", 0), ("Index pulse {n}", 0)];
+pub(super) const CIA402_SAMPLES: &str = "Sample at {edge} edge {n}";
+
+/// Axis I/O Status bits (Table 5-2.63): what sets them, what keeps them from being set, and the bit of an axis that counts the other way.
+pub(super) const IO_STATUS: &[(&str, &str, Option<&str>, Option<&str>)] = &[
+    ("Home Input", "home_switch", None, None),
+    (
+        "Positive Overtravel OK Input",
+        "limit_switches",
+        Some("positive_limit_switch"),
+        Some("Negative Overtravel OK Input"),
+    ),
+    (
+        "Negative Overtravel OK Input",
+        "limit_switches",
+        Some("negative_limit_switch"),
+        Some("Positive Overtravel OK Input"),
+    ),
+];
+
+/// Axis Fault Action (attribute 668) of each reaction: how the axis stops, and the state that it comes to.
+pub(super) const REACTIONS: &[(&str, &str, &str)] = &[
+    ("ignore", "No Action", "No Action"),
+    ("alarm", "No Action", "No Action"),
+    ("hold_position", "Current Limited Stop", "Hold"),
+    ("decelerate_and_disable", "Current Limited Stop", "Disable"),
+    ("coast_and_disable", "Coast", "Disable"),
+    ("shutdown", "Coast", "Shutdown"),
+];
+
+/// Causes that the gateway or the device in it finds; all others only a drive does.
+pub(super) const FOUND_BY_BOX: &[&str] = &[
+    "commutation",
+    "motor_over_speed_user_limit",
+    "power_loss",
+    "feedback_data_loss",
+    "excessive_position_error",
+    "hardware_overtravel_positive",
+    "hardware_overtravel_negative",
+    "software_overtravel_positive",
+    "software_overtravel_negative",
+    "enable_input_lost",
+    "position_command_limit",
+    "velocity_command_limit",
+    "homing",
+    "start_time_out",
+    "stop_time_out",
+    "unexpected_torque",
+    "left_operation",
+    "south_silence",
+    "configuration",
+    "safe_torque_off",
+];
+pub(super) const FOUND_BY_DEVICE: &[&str] = &["external_input", "controller_abort", "illegal_mode"];
+
+/// Exceptions that a controller may set to Ignore: limits of the user, what the gateway watches, and warnings. An exception for which the
+/// drive has switched itself off is a major fault whatever is set (5-2.3.16.1).
+pub(super) const IGNORABLE: &[&str] = &[
+    "motor_over_speed_user_limit",
+    "motor_over_temperature_user_limit",
+    "motor_overload_user_limit",
+    "drive_over_temperature_user_limit",
+    "under_voltage_user_limit",
+    "excessive_position_error",
+    "hardware_overtravel_positive",
+    "hardware_overtravel_negative",
+    "software_overtravel_positive",
+    "software_overtravel_negative",
+    "controller_abort",
+    "illegal_mode",
+    "drive_warning",
+    "cooling_warning",
+    "position_command_warning",
+    "velocity_command_warning",
+];
+
+/// Operation modes of SERCOS that a generic mode selects, the preferred one first: without following distance, if the drive can.
+pub(super) const SERCOS_CODES: &[(&str, bool, &[&str])] = &[
+    ("position", false, &["Position control, feedback 1, lagless", "Position control, feedback 1"]),
+    ("velocity", false, &["Velocity control"]),
+    ("torque", false, &["Torque control"]),
+    (
+        "position",
+        true,
+        &[
+            "Drive controlled interpolation, feedback 1, lagless",
+            "Drive controlled interpolation, feedback 1",
+        ],
+    ),
+];
+
+/// How drives spell units in element 4, and the unit that it is.
+pub(super) const SPELLINGS: &[(&str, &str)] = &[
+    ("mm/U", "mm/Rev"),
+    ("mm/rev.", "mm/Rev"),
+    ("mm", "mm/Rev"),
+    ("um/U", "um/Rev"),
+    ("um", "um/Rev"),
+    ("\u{b5}m", "um/Rev"),
+    ("in", "inch/Rev"),
+    ("inch", "inch/Rev"),
+    ("\u{b0}C", "degC"),
+    ("C", "degC"),
+];
+
+/// Captures of a SERCOS drive beside those of a field of their own.
+pub(super) const SERCOS_EDGES: &[(&str, &str)] = &[
+    ("marker", "positive"),
+    ("home_switch_marker_positive", "positive"),
+    ("home_switch_marker_positive", "negative"),
+];
+
+/// What a drive says of itself: the lists of what its telegrams may carry, and errors that are left over; its modes, and which values
+/// it inverts.
+pub(super) const SERCOS_READS: &[&str] = &["S-0-0187", "S-0-0188", "S-0-0011"];
+pub(super) const CIA402_READS: &[&str] = &["6502:00", "607E:00"];

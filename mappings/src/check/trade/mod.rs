@@ -8,9 +8,14 @@
 
 mod access;
 mod bindings;
+mod causes;
 mod cia402_words;
 mod cip_words;
+mod controller;
 mod facts;
+mod gaps;
+mod modes;
+mod policies;
 mod scales;
 mod sercos_words;
 mod signs;
@@ -27,20 +32,38 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     signs::sercos(mapping, findings);
     bindings::sercos(mapping, findings);
     bindings::cip(mapping, findings);
+    bindings::cip_names(mapping, findings);
+    bindings::sercos_places(mapping, findings);
     access::sercos(mapping, findings);
     scales::sercos(mapping, findings);
     scales::cip(mapping, findings);
     sercos_words::check(mapping, findings);
+    causes::sercos(mapping, findings);
+    causes::cip(mapping, findings);
+    policies::sercos(mapping, findings);
+    policies::cip(mapping, findings);
+    modes::sercos(mapping, findings);
     cip_words::check(mapping, findings);
+    controller::check(mapping, findings);
+    // What nobody binds may follow from what is bound to the wrong place. A family has what its drives have, and says no reasons.
+    if !findings.has_errors() {
+        gaps::sercos(mapping, findings);
+        gaps::cip(mapping, findings);
+        gaps::cia402(mapping, findings);
+    }
 }
 
 /// Compares CiA 402, of which a family can have rows of its own.
 pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     signs::cia402(mapping, findings);
     bindings::cia402(mapping, findings);
+    bindings::cia402_places(mapping, findings);
     access::cia402(mapping, findings);
     scales::cia402(mapping, findings);
     cia402_words::check(mapping, findings);
+    causes::cia402(mapping, findings);
+    policies::cia402(mapping, findings);
+    modes::cia402(mapping, findings);
 }
 
 /// The place of a key that may be missing: its own, else that of what names the row.

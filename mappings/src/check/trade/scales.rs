@@ -5,7 +5,7 @@ use profile_generic::scaling::UnitKind;
 use profile_sercos::wire::idn::Idn;
 
 use super::super::axes::short;
-use super::facts::{DISPLACEMENTS, FACTORS, FEED, GEAR, INCH, METRE, SCALED_UNITS, TURN, UNITS};
+use super::facts::{DISPLACEMENTS, FACTORS, FEED, GEAR, INCH, METRE, SCALED_UNITS, SPELLINGS, TURN, UNITS};
 use super::{Reporter, is_standard, place_of};
 use crate::finding::Findings;
 use crate::finding::registry::{WRONG_SCALE, WRONG_SHAFT};
@@ -55,6 +55,10 @@ fn formula(scaling: &str, word: u32, axis: UnitKind) -> Option<f64> {
         _ => return None,
     };
     let (parameter, other_unit, seconds, load) = (bit(3), bit(4), bit(5), bit(6));
+    // No source has another unit of time than that of a velocity.
+    if seconds && scaling != "velocity" {
+        return None;
+    }
     let by_parameters = f64::from(FACTOR) * 10_f64.powi(EXPONENT);
     let preferred = |size: f64, known: bool| if parameter || !known { by_parameters } else { size };
     let length = if other_unit { INCH } else { METRE };
@@ -115,6 +119,18 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_sercos;
     let mut reporter = Reporter { source: &file.text, findings };
     units(&mut reporter, &file.rows.unit);
+    for row in &file.rows.unit {
+        for text in &row.texts {
+            let fact = SPELLINGS.iter().find(|(known, _)| *known == text.as_str());
+            let Some((_, right)) = fact.filter(|(_, right)| row.unit.get_ref() != right) else { continue };
+            let what = [
+                format!("`{text}` is taken for the unit `{}`", row.unit.get_ref()),
+                format!("drives write it for `{right}`"),
+                format!("move the text to the row of `{right}`"),
+            ];
+            reporter.report(WRONG_SCALE, ("unit", row.unit.span()), what);
+        }
+    }
     for (rule, row) in mapping.sercos.scalings.iter().zip(&file.rows.scaling) {
         let name = row.scaling.get_ref().as_str();
         let Some((_, word, factor, exponent)) = SERCOS.iter().find(|(known, ..)| *known == name) else {
@@ -134,9 +150,21 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
             continue;
         }
         let mut reported = vec![false; row.methods.len()];
+        let mut untaken = false;
         for (case, axis) in (0..128_u32).flat_map(|word| [(word, UnitKind::Rotary), (word, UnitKind::Linear)])
         {
+            let right = formula(name, case, axis);
             let Some(at) = rule.methods.iter().position(|method| method.pattern.matches(case)) else {
+                if right.is_some() && !untaken {
+                    untaken = true;
+                    let what = [
+                        format!("no method of the {name} takes {} = {case:#04x}", row.word.get_ref()),
+                        "it is a scaling type of the standard: a drive that counts so could not be used"
+                            .to_owned(),
+                        "add the method, or correct the `pattern` of one".to_owned(),
+                    ];
+                    reporter.report(WRONG_SCALE, ("scaling", row.scaling.span()), what);
+                }
                 continue;
             };
             let method = &row.methods[at];
@@ -148,7 +176,6 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
                 feed: &|_| Ok(Ratio::new(FEED_MM.into(), 1).unwrap_or(Ratio::ONE)),
             };
             let given = rule.lsb(&source).map(|lsb| lsb.generic.to_f64(1));
-            let right = formula(name, case, axis);
             let off = match (&given, right) {
                 (Ok(given), Some(right)) => ((given / right) - 1.0).abs() > TOLERANCE,
                 (Ok(_), None) => true,
@@ -306,6 +333,15 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
         let code = row.code.get_ref();
         let end = code.rsplit(' ').next().unwrap_or_default();
         let Some((_, right)) = DISPLACEMENTS.iter().find(|(known, _)| *known == end) else { continue };
+        let turns = if end.starts_with("Rev") { "rotary" } else { "linear" };
+        if row.kind.get_ref() != turns {
+            let what = [
+                format!("`{code}` is taken for a {} unit", row.kind.get_ref()),
+                format!("it is {turns}"),
+                format!("write `kind = \"{turns}\"`"),
+            ];
+            reporter.report(WRONG_SCALE, ("kind", row.kind.span()), what);
+        }
         let given = quotient(*row.nanounits.get_ref(), 1);
         if (given / right - 1.0).abs() > TOLERANCE {
             let what = [

@@ -3,18 +3,19 @@
 use profile_generic::program::BitPattern;
 use profile_generic::state::Report;
 
-use super::facts::SERCOS_MODES;
+use super::facts::{SERCOS_CODES, SERCOS_MODES};
 use super::{Reporter, is_standard, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
 use crate::finding::registry::{WEAKER_REACTION, WRONG_ORDER, WRONG_STATE};
-use crate::sercos::tables::ReportRule;
+use crate::sercos::tables::{ReportRule, StatusRule};
 
 // S-0-0135, Drive status.
 const READY: u32 = 0xC000;
 const READY_SHIFT: u32 = 14;
 const ERROR: u32 = 1 << 13;
 const WARNING: u32 = 1 << 12;
+const REFERENCED: u32 = 1 << 5;
 const HALTED: u32 = 1 << 4;
 const FOLLOWS: u32 = 1 << 3;
 
@@ -22,43 +23,40 @@ const FOLLOWS: u32 = 1 << 3;
 const ON: u32 = 1 << 15;
 const ENABLE: u32 = 1 << 14;
 const RESTART: u32 = 1 << 13;
+const MOVES: u32 = ON | ENABLE | RESTART;
 
 /// What an action has to do with the control word: the bits that count, their values, and what they do.
 const ACTIONS: &[(&str, u32, u32, &str)] = &[
-    ("energize", ON, 0, "bit 15 (drive on) is 0"),
-    (
-        "enable",
-        ON | ENABLE | RESTART,
-        ON | ENABLE | RESTART,
-        "bits 15, 14 and 13 (on, enable, restart) are 1",
-    ),
+    ("energize", MOVES, 0, "bits 15, 14 and 13 (on, enable, restart) are 0"),
+    ("enable", MOVES, MOVES, "bits 15, 14 and 13 (on, enable, restart) are 1"),
     (
         "disable",
-        ON | ENABLE,
-        ENABLE,
-        "bit 15 (on) is 0 and bit 14 (enable) is 1: the drive brakes with torque",
+        MOVES,
+        ENABLE | RESTART,
+        "bit 15 (on) is 0 and bits 14 and 13 (enable, restart) are 1: the drive brakes with torque",
     ),
-    (
-        "halt",
-        ON | ENABLE | RESTART,
-        ON | ENABLE,
-        "bits 15 and 14 (on, enable) are 1 and bit 13 (restart) is 0",
-    ),
-    ("torque_off", ON | ENABLE, 0, "bits 15 and 14 (on, enable) are 0"),
-    ("reset_fault", ON | ENABLE, 0, "bits 15 and 14 (on, enable) are 0"),
+    ("halt", MOVES, ON | ENABLE, "bits 15 and 14 (on, enable) are 1 and bit 13 (restart) is 0"),
+    ("torque_off", MOVES, 0, "bits 15, 14 and 13 (on, enable, restart) are 0"),
+    ("reset_fault", MOVES, 0, "bits 15, 14 and 13 (on, enable, restart) are 0"),
 ];
 
 /// The command that resets class 1 diagnostics.
 const RESET: &str = "S-0-0099";
 
-/// Status bits that follow from S-0-0135: the bits that have to be seen, and what they show.
-const STATUS: &[(&str, u32, u32, &str)] = &[
-    ("enabled", READY, READY, "Ready to operate is 3"),
-    ("tracking", READY, READY, "Ready to operate is 3"),
-    ("power", 1 << 15, 1 << 15, "Ready to operate is 2 or 3"),
-    ("ready", READY, 1 << 15, "Ready to operate is 2"),
-    ("fault", ERROR, ERROR, "bit 13 is 1"),
-    ("warning", WARNING, WARNING, "bit 12 is 1"),
+/// A status bit of S-0-0135: what shows it, in words, and whether a word of a drive that acknowledges or not shows it.
+type Shown = (&'static str, &'static str, fn(u32, bool) -> bool);
+
+const STATUS: &[Shown] = &[
+    ("enabled", "Ready to operate is 3", |word, _| word & READY == READY),
+    ("tracking", "Ready to operate is 3, and bit 3 is 1 where the drive has it", |word, acknowledges| {
+        word & READY == READY && (!acknowledges || word & FOLLOWS != 0)
+    }),
+    ("power", "Ready to operate is 2 or 3", |word, _| word & 1 << 15 != 0),
+    ("ready", "Ready to operate is 2 and bit 13 is 0", |word, _| word & (READY | ERROR) == 1 << 15),
+    ("fault", "bit 13 is 1", |word, _| word & ERROR != 0),
+    ("warning", "bit 12 is 1", |word, _| word & WARNING != 0),
+    ("halt", "bit 4 is 1 and the drive has it", |word, acknowledges| acknowledges && word & HALTED != 0),
+    ("referenced", "bit 5 is 1", |word, _| word & REFERENCED != 0),
 ];
 
 pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
@@ -138,22 +136,48 @@ fn reports(mapping: &Mapping, reporter: &mut Reporter<'_>) {
 }
 
 fn status(mapping: &Mapping, reporter: &mut Reporter<'_>) {
-    let rows = &mapping.tables().generic_sercos.rows.status;
-    for (rule, row) in mapping.sercos.status.iter().zip(rows) {
-        if rule.word != mapping.sercos.status_word {
-            continue;
+    let rows = &mapping.tables().generic_sercos.rows;
+    let bits = [1 << 15, 1 << 14, ERROR, WARNING, REFERENCED, HALTED, FOLLOWS];
+    let cases = 0..1_u32 << (bits.len() + 1);
+    let cases: Vec<(u32, bool)> = cases
+        .map(|case| {
+            let word = (0..bits.len()).filter(|bit| case >> bit & 1 == 1).map(|bit| bits[bit]).sum();
+            (word, case >> bits.len() & 1 == 1)
+        })
+        .collect();
+    for (name, why, shows) in STATUS {
+        let own: Vec<_> = mapping
+            .sercos
+            .status
+            .iter()
+            .zip(&rows.status)
+            .filter(|(rule, row)| rule.word == mapping.sercos.status_word && row.status.get_ref() == name)
+            .collect();
+        let fits = |rule: &StatusRule, (word, acknowledges): (u32, bool)| {
+            rule.pattern.matches(word) && rule.acknowledges.is_none_or(|wanted| wanted == acknowledges)
+        };
+        let mut wrong = false;
+        for (rule, row) in &own {
+            if cases.iter().any(|case| fits(rule, *case) && !shows(case.0, case.1)) {
+                wrong = true;
+                let what = [
+                    format!("`{name}` is taken from other bits of S-0-0135"),
+                    format!("the drive shows it when {why}"),
+                    "correct `pattern`".to_owned(),
+                ];
+                reporter.report(WRONG_STATE, ("status", row.status.span()), what);
+            }
         }
-        let fact = STATUS.iter().find(|(name, ..)| name == row.status.get_ref());
-        let Some((name, mask, value, why)) = fact else { continue };
-        if implies(rule.pattern, BitPattern::new(*mask, *value)) {
-            continue;
+        let missed =
+            |case: &&(u32, bool)| shows(case.0, case.1) && !own.iter().any(|(rule, _)| fits(rule, **case));
+        if let Some((word, _)) = cases.iter().find(missed).filter(|_| !wrong) {
+            let what = [
+                format!("no row takes `{name}` from S-0-0135 = {word:04X}"),
+                format!("the drive shows it when {why}"),
+                format!("add a [[status]] row of the word, with `status = \"{name}\"`"),
+            ];
+            reporter.report(WRONG_STATE, ("status", rows.words.status.span()), what);
         }
-        let what = [
-            format!("`{name}` is taken from other bits of S-0-0135"),
-            format!("the drive shows it when {why}"),
-            "correct `pattern`".to_owned(),
-        ];
-        reporter.report(WRONG_STATE, ("status", row.status.span()), what);
     }
 }
 
@@ -214,6 +238,18 @@ fn modes(mapping: &Mapping, reporter: &mut Reporter<'_>) {
         let known =
             SERCOS_MODES.iter().find(|(mode, drive, _)| mode == row.mode.get_ref() && *drive == by_drive);
         let Some((mode, _, begin)) = known else { continue };
+        let codes = SERCOS_CODES.iter().find(|(known, drive, _)| known == mode && *drive == by_drive);
+        let given: Vec<&str> = row.codes.iter().map(|code| code.get_ref().as_str()).collect();
+        let of_fact = |codes: &[&str]| given.iter().all(|code| codes.contains(code));
+        if let Some((_, _, codes)) = codes.filter(|(_, _, codes)| of_fact(codes) && given != *codes) {
+            let listed: Vec<String> = codes.iter().map(|code| format!("\"{code}\"")).collect();
+            let what = [
+                format!("the operating mode `{mode}` selects its codes in another order, or not all of them"),
+                format!("expected {}: the first that the drive takes counts", listed.join(", ")),
+                format!("write `codes = [{}]`", listed.join(", ")),
+            ];
+            reporter.report(WRONG_STATE, ("mode", row.mode.span()), what);
+        }
         for code in &row.codes {
             let name = code.get_ref();
             let of_another =

@@ -14,7 +14,7 @@ use super::{
     StatusRule, StepKind, StepRule,
 };
 use crate::cip_tables::{CipTables, ExceptionRow};
-use crate::dictionary::{Dictionaries, IdnFormat, IdnUnit, SercosIdn, Word, quantity};
+use crate::dictionary::{Dictionaries, IdnFormat, IdnPart, IdnUnit, SercosIdn, Word, quantity};
 use crate::drive_program::{FaultRow, PROCEDURE_COMMANDS_MAX, STATUS_WORDS_MAX};
 use crate::drive_rows::{
     FAILS, every_action, fixed_unit, mapped, mode_row, once, parameter_row, signal_row, written_parameter,
@@ -127,6 +127,9 @@ impl<'a> Builder<'a> {
                 }
             }
         }
+        let profile = self.dictionaries.sercos.idns().iter().filter(|row| row.part == IdnPart::Profile);
+        let answered = |idn: Idn| known.contains(&idn) || self.bound.iter().any(|(bound, _)| *bound == idn);
+        self.tables.unanswered = profile.map(|row| row.idn).filter(|idn| !answered(*idn)).collect();
     }
 
     /// The word with this name and the one IDN that holds it.

@@ -153,6 +153,8 @@ pub struct SercosTables {
     pub(crate) steps: Vec<StepRule>,
     /// IDNs of the drive profile that no row binds, and why.
     pub unbound: Vec<(Idn, String)>,
+    /// Those that no row binds for no reason.
+    pub(crate) unanswered: Vec<Idn>,
 }
 
 impl SercosTables {

@@ -1,0 +1,163 @@
+//! What an axis cannot do without does not go missing in silence.
+//!
+//! A policy says what happens where a drive lacks a value or refuses a step. The weaker one of the two lets the axis come to
+//! operation without it: good for what is only read, and not for a set-point, a mode or a limit.
+
+use super::facts::{ALWAYS_THERE, LIMITS, MODE_STEPS, REQUIRED, REQUIRED_OF_SERCOS, WITHOUT_ENCODER};
+use super::{Reporter, is_standard};
+use crate::Mapping;
+use crate::dictionary::Access;
+use crate::finding::Findings;
+use crate::finding::registry::POLICY_WEAK;
+use crate::format::Name;
+
+pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().generic_sercos;
+    let mut reporter = Reporter { source: &file.text, findings };
+    for row in &file.rows.signal {
+        if is_standard(row.idn.get_ref()) {
+            signal(&mut reporter, &row.signal, &row.missing, &[]);
+        }
+        if row.signal.get_ref() == REQUIRED_OF_SERCOS {
+            required(&mut reporter, &row.signal, &row.missing);
+        }
+    }
+    for row in file.rows.scaling.iter().filter(|row| row.scaling.get_ref() == "position" && !row.exact) {
+        let what = [
+            "positions may be rounded in silence".to_owned(),
+            "a position that does not come back exactly drifts: a drive whose scaling does not fit is refused"
+                .to_owned(),
+            "write `exact = true`".to_owned(),
+        ];
+        reporter.report(POLICY_WEAK, ("scaling", row.scaling.span()), what);
+    }
+    for row in &file.rows.mode {
+        mode(&mut reporter, &row.mode, row.interpolation.as_ref(), &row.missing);
+    }
+    for row in &file.rows.commission {
+        step(&mut reporter, &row.step, row.parameter.as_ref(), &row.refused);
+    }
+}
+
+pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().generic_cia402;
+    let mut reporter = Reporter { source: &file.text, findings };
+    for row in &file.rows.signal {
+        if is_standard(row.object.get_ref()) {
+            signal(&mut reporter, &row.signal, &row.missing, &row.modes);
+        }
+    }
+    for row in &file.rows.mode {
+        mode(&mut reporter, &row.mode, row.interpolation.as_ref(), &row.missing);
+    }
+    for row in &file.rows.commission {
+        step(&mut reporter, &row.step, row.parameter.as_ref(), &row.refused);
+    }
+}
+
+/// A cyclic value of a drive, or of some of its modes.
+fn signal(reporter: &mut Reporter<'_>, name: &Name, missing: &Name, modes: &[Name]) {
+    let (mode, shown) = WITHOUT_ENCODER;
+    let without_encoder = modes.iter().any(|name| name.get_ref() == mode);
+    let is = |wanted: &str| name.get_ref() == wanted;
+    let required = if without_encoder {
+        is(shown) || !is("position_actual") && REQUIRED.contains(&name.get_ref().as_str())
+    } else {
+        REQUIRED.contains(&name.get_ref().as_str())
+    };
+    if required {
+        self::required(reporter, name, missing);
+    }
+}
+
+/// A value that no axis can do without.
+fn required(reporter: &mut Reporter<'_>, name: &Name, missing: &Name) {
+    if missing.get_ref() != "refuse" {
+        let what = [
+            format!("`{}` may be missing in silence", name.get_ref()),
+            "a drive that lacks it would come to operation, and the mode needs it".to_owned(),
+            "write `missing = \"refuse\"`".to_owned(),
+        ];
+        reporter.report(POLICY_WEAK, ("missing", missing.span()), what);
+    }
+}
+
+/// A mode of which the controller makes the set-points: one that is configured is there.
+fn mode(reporter: &mut Reporter<'_>, name: &Name, interpolation: Option<&Name>, missing: &Name) {
+    let by_drive = interpolation.is_some_and(|name| name.get_ref() == "drive");
+    if !by_drive && missing.get_ref() != "refuse" {
+        let what = [
+            format!("the operating mode `{}` may be missing in silence", name.get_ref()),
+            "a drive that lacks a mode of its axis would come to operation without it".to_owned(),
+            "write `missing = \"refuse\"`; an axis that does without the mode has `modes` of its own"
+                .to_owned(),
+        ];
+        reporter.report(POLICY_WEAK, ("missing", missing.span()), what);
+    }
+}
+
+/// A step of commissioning.
+fn step(reporter: &mut Reporter<'_>, step: &Name, parameter: Option<&Name>, refused: &Name) {
+    let limit = parameter.filter(|name| LIMITS.contains(&name.get_ref().as_str()));
+    let what = match limit {
+        Some(limit) => format!("the limit `{}` of the configuration", limit.get_ref()),
+        None if MODE_STEPS.contains(&step.get_ref().as_str()) => "the operating mode".to_owned(),
+        None => return,
+    };
+    if refused.get_ref() != "fail" {
+        let what = [
+            format!("`{}` may fail in silence", limit.unwrap_or(step).get_ref()),
+            format!("a drive that refuses {what} would come to operation without it"),
+            "write `refused = \"fail\"`".to_owned(),
+        ];
+        reporter.report(POLICY_WEAK, ("refused", refused.span()), what);
+    }
+}
+
+/// Elements and attributes of CIP Motion, and exceptions that nobody is told.
+pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
+    let file = &mapping.tables().cip_generic;
+    let mut reporter = Reporter { source: &file.text, findings };
+    for row in &file.rows.cyclic {
+        let always = row.element.get_ref() == ALWAYS_THERE;
+        let right = if always { "zero" } else { "absent" };
+        if row.missing.get_ref() != right {
+            let element = row.element.get_ref();
+            let what = [
+                format!("`{element}` is not told as missing"),
+                match always {
+                    true => "every update has the position: of a drive that is gone, the last one".to_owned(),
+                    false => "the controller would take 0 for a value that nobody has".to_owned(),
+                },
+                format!("write `missing = \"{right}\"`"),
+            ];
+            reporter.report(POLICY_WEAK, ("missing", row.missing.span()), what);
+        }
+    }
+    for row in &file.rows.attribute {
+        let Some(attribute) = mapping.dictionaries.cip.attribute(row.attribute.get_ref()) else { continue };
+        // What a controller only reads cannot be what it has set.
+        let read_only = attribute.access == Access::Get;
+        if let Some(missing) =
+            row.missing.as_ref().filter(|missing| read_only && missing.get_ref() == "shadow")
+        {
+            let what = [
+                format!("`{}` is not told as missing", attribute.name),
+                "of a drive without the parameter the controller would read a value that nobody has"
+                    .to_owned(),
+                "write `missing = \"reject\"`".to_owned(),
+            ];
+            reporter.report(POLICY_WEAK, ("missing", missing.span()), what);
+        }
+    }
+    for row in &file.rows.fault {
+        if let Some(default) = row.default.as_ref().filter(|action| action.get_ref() == "Ignore") {
+            let what = [
+                format!("`{}` is ignored until the controller asks for it", row.cause.get_ref()),
+                "the controller would not be told: no alarm and no fault comes of it".to_owned(),
+                "write `default = \"Alarm\"`, or remove `default`".to_owned(),
+            ];
+            reporter.report(POLICY_WEAK, ("default", default.span()), what);
+        }
+    }
+}
