@@ -29,6 +29,7 @@ mod ending;
 pub mod local;
 pub mod north;
 pub mod notice;
+pub mod parameter;
 pub mod port;
 mod publication;
 mod schedule;
@@ -121,6 +122,12 @@ impl Engine {
     /// Adds local control; to be called before the first cycle.
     pub fn set_local(&mut self, local: LocalNorth) {
         self.local = Some(local);
+    }
+
+    /// The mapping tables.
+    #[must_use]
+    pub fn mapping(&self) -> &Mapping {
+        &self.mapping
     }
 
     /// The axes in the order of the configuration.
@@ -306,6 +313,7 @@ impl Engine {
         let mut exchange = Exchange { now, time, mapping, ending: ending.has_begun, axes, notice };
         if let Some(local) = local {
             local.exchange(&mut exchange);
+            local.parameters(mapping, exchange.axes, buses);
         }
         for channel in devices {
             channel.exchange(&mut exchange);
@@ -344,7 +352,7 @@ impl Engine {
 
     fn run_buses(&mut self, now: MonotonicTime) {
         let system = self.clock.base.system_at(now);
-        let Self { mapping, buses, devices, axes, notices, .. } = self;
+        let Self { mapping, buses, devices, local, axes, notices, .. } = self;
         let idle = devices.iter().all(|channel| channel.device().connection().is_none())
             && axes.iter().all(|axis| axis.owner() != Owner::Local);
         // Both closures push notices, never at the same time.
@@ -352,7 +360,7 @@ impl Engine {
         let mut notice = |notice| push(&mut notices.borrow_mut(), notice);
         let mut hand_on = |axes: &mut [AxisChannel], answer| {
             let notice = &mut |notice| push(&mut notices.borrow_mut(), notice);
-            hand_on((now, system), devices, axes, answer, notice);
+            hand_on((now, system), (&mut *devices, local.as_mut()), axes, answer, notice);
         };
         for bus in buses.iter_mut() {
             bus.set_idle(idle);
@@ -364,7 +372,7 @@ impl Engine {
 /// Hands the answer of a drive to whom has asked.
 fn hand_on(
     (now, system): (MonotonicTime, SystemTime),
-    devices: &mut [DeviceChannel],
+    (devices, local): (&mut [DeviceChannel], Option<&mut LocalNorth>),
     axes: &mut [AxisChannel],
     answer: Answer,
     notice: &mut dyn FnMut(Notice),
@@ -374,6 +382,11 @@ fn hand_on(
     match answer.purpose {
         Purpose::Attribute { .. } => {
             devices.iter_mut().any(|channel| channel.answer(&answer, axes));
+        }
+        Purpose::LocalParameter(ticket) => {
+            if let Some(local) = local {
+                local.parameter_answered(ticket, &answer, axis);
+            }
         }
         Purpose::Diagnosis => axis.diagnostic_word(now, system, answer.item, data.ok().and_then(unsigned)),
         Purpose::DiagnosticMessage => {

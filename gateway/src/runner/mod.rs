@@ -46,6 +46,7 @@ use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::CanPort;
 use crate::host::HostPort;
 use crate::latest::Reader;
+use crate::local::protocol::NamedParameter;
 use crate::local::{LocalServer, Shared, SocketFile};
 use crate::mapping::Mapping;
 use crate::modbus::ModbusServer;
@@ -328,6 +329,7 @@ fn serve_local(
     let shared = Shared {
         names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
         kinds: config.axes.iter().map(|axis| axis.kind).collect(),
+        parameters: NamedParameter::of(engine.mapping()),
         status: status.clone(),
     };
     let (server, file) = LocalServer::bind(path, shared, end)

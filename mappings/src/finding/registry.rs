@@ -375,6 +375,18 @@ registry! {
         "The drive has already switched itself off for this error. A row that makes a warning of it lets the controller believe that the axis still moves.",
         "[[generic-sercos.fault]]\nword = \"Class 1 diagnostic\"\npattern = [{ field = \"Overload shut-down\", is = 1 }]\ncause = \"motor_overload_user_limit\"\nreaction = \"alarm\"",
         "Remove `reaction`.";
+    COMPUTED_RANGE = 66 Error "a computed value that does not fit":
+        "With values that the operands can have, the result is beyond the range of its parameter or of its attribute, beyond 64 bits, or divided by zero. The ranges are those of the parameters, or else all that the drive's bytes can hold. The gateway would refuse the read or the write.",
+        "[[generic.parameter]]\nnumber = 0x8001\nname = \"heat\"\nquantity = \"power\"\ntype = \"integer\"\naccess = \"read\"\nrange = [0, 1_000]\n\n[[generic.computed]]\nparameter = \"heat\"\nproduct = [\"motor_rated_current\", \"bus_voltage\"]\nsource = \"P = I U\"",
+        "Give the operands a `range`, widen that of the result, or say in `saturates` why the result may be held at the end of its range.";
+    COMPUTED_CYCLE = 67 Error "computed values that need each other":
+        "A value is computed from one that is computed from it, so neither can be known.",
+        "[[generic.parameter]]\nnumber = 0x8001\nname = \"one\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"read\"\n\n[[generic.parameter]]\nnumber = 0x8002\nname = \"other\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"read\"\n\n[[generic.computed]]\nparameter = \"one\"\nsum = [\"other\"]\nsource = \"none\"\n\n[[generic.computed]]\nparameter = \"other\"\nsum = [\"one\"]\nsource = \"none\"",
+        "Compute one of them from parameters that the drive has.";
+    NOT_INVERTIBLE = 68 Error "a computed value that cannot be set":
+        "Setting a computed value writes one operand so that the result becomes what was set. That needs one operand of your own that stands in the row once, is not computed itself, and does not select.",
+        "[[generic.parameter]]\nnumber = 0x8001\nname = \"area\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"write\"\n\n[[generic.parameter]]\nnumber = 0x8002\nname = \"side\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"write\"\n\n[[generic.computed]]\nparameter = \"area\"\nproduct = [\"side\", \"side\"]\nwrites = \"side\"\nsource = \"none\"",
+        "Name another operand in `writes`, or give the parameter `access = \"read\"`.";
 
     OVERLAY_NO_EFFECT = 70 Warning "a row that changes nothing":
         "The row of the overlay says what the table already says. Either the table now has the change, or something else was meant.",
