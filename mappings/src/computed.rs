@@ -181,9 +181,7 @@ impl Computation {
             Operation::Ratio(dividend, divisor) => {
                 (self.operand(*dividend, known)?, self.operand(*divisor, known)?)
             }
-            Operation::Selection(by, choices) => {
-                (self.operand(self.choice(*by, choices, known)?, known)?, 1)
-            }
+            Operation::Selection(by, choices) => (self.operand(self.choice(*by, choices, known)?, known)?, 1),
         };
         let top = times(top, i128::from(row.factor.num()))?;
         let bottom = times(bottom, i128::from(row.factor.den()))?;
@@ -229,12 +227,7 @@ impl Computation {
     }
 
     /// All of them multiplied, without one of them.
-    fn product(
-        &self,
-        factors: &[Operand],
-        without: Option<Operand>,
-        known: &Known,
-    ) -> Result<i128, NoValue> {
+    fn product(&self, factors: &[Operand], without: Option<Operand>, known: &Known) -> Result<i128, NoValue> {
         let mut factors = factors.iter().filter(|factor| Some(**factor) != without);
         factors.try_fold(1, |product, factor| times(product, self.operand(*factor, known)?))
     }
@@ -243,12 +236,7 @@ impl Computation {
         i64::try_from(self.operand(by, known)?).map_err(|_| NoValue::Beyond)
     }
 
-    fn choice(
-        &self,
-        by: Operand,
-        choices: &[(i64, Operand)],
-        known: &Known,
-    ) -> Result<Operand, NoValue> {
+    fn choice(&self, by: Operand, choices: &[(i64, Operand)], known: &Known) -> Result<Operand, NoValue> {
         let selected = self.selected(by, known)?;
         let found = choices.iter().find(|(is, _)| *is == selected);
         found.map(|(_, taken)| *taken).ok_or(NoValue::Choice(selected))

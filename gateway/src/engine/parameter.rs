@@ -6,6 +6,7 @@
 
 use arrayvec::ArrayVec;
 use profile_generic::parameter::{Access as When, Parameter};
+use profile_generic::state::Report;
 
 use super::access::{Access, AccessFailure, Refusal};
 use super::axis::AxisChannel;
@@ -108,7 +109,9 @@ impl ParameterJob {
         if self.asked != Asked::Nothing {
             return Next::Wait;
         }
-        if let Some(failure) = self.refused(mapping, axis) {
+        let is_gone = axis.feedback().report == Report::Silent;
+        let refused = self.refused(mapping, axis);
+        if let Some(failure) = refused.or(is_gone.then_some(ParameterFailure::Unanswered)) {
             self.fail(failure);
             return Next::Done(Err(failure));
         }

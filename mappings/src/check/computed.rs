@@ -38,8 +38,7 @@ fn rows(mapping: &Mapping) -> impl Iterator<Item = (&ComputedRow, &Computation)>
 pub(super) fn bindings(mapping: &Mapping, findings: &mut Findings) {
     let tables = mapping.tables();
     let of_families = mapping.families().iter().map(|family| &family.mapping);
-    let cia402: Vec<_> =
-        of_families.chain([mapping]).map(|known| &known.tables().generic_cia402).collect();
+    let cia402: Vec<_> = of_families.chain([mapping]).map(|known| &known.tables().generic_cia402).collect();
     let generic = &mapping.dictionaries.generic;
     let is_computed = |name: &Name| {
         generic.parameter(name.get_ref()).is_some_and(|row| generic.computation(row.parameter).is_some())
@@ -163,7 +162,8 @@ fn beyond_attribute(
     (low, high): Interval,
 ) -> Option<&'static str> {
     let table = mapping.attribute_table(scaling)?;
-    let of = |backing: Backing| matches!(backing, Backing::Parameter { parameter: own, .. } if own.0 == parameter);
+    let of =
+        |backing: Backing| matches!(backing, Backing::Parameter { parameter: own, .. } if own.0 == parameter);
     let entry = *table.entries().iter().find(|entry| of(entry.backing))?;
     let clamped = |end: i128| {
         let end = i64::try_from(end).ok();
@@ -221,7 +221,8 @@ fn result(row: &Row, reads: &[Interval], results: &[Interval]) -> Result<Interva
             let (top, bottom) = (multiplied(*top, num)?, multiplied(*bottom, den)?);
             let outcome = quotient(top, bottom, row.rounding).ok_or(Unfit::Divisor)?;
             // Beyond 64 bits by however much.
-            let value = i128::from(outcome.value) + if outcome.saturated { top.signum() * bottom.signum() } else { 0 };
+            let value = i128::from(outcome.value)
+                + if outcome.saturated { top.signum() * bottom.signum() } else { 0 };
             let (low, high) = ends.unwrap_or((value, value));
             ends = Some((low.min(value), high.max(value)));
         }

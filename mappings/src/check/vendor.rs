@@ -44,8 +44,12 @@ pub(super) fn bindings(mapping: &Mapping, findings: &mut Findings) {
             || cia402.iter().any(|rows| rows.parameter.iter().any(|row| is(&row.parameter)));
         let expected = match (north, south) {
             (true, true) => continue,
-            (false, _) => "expected an [[attribute]] row of cip-generic with this parameter, or a computed value that uses it, got none",
-            (true, false) => "expected a [[parameter]] row of generic-sercos or generic-cia402, or a [[computed]] row, got none",
+            (false, _) => {
+                "expected an [[attribute]] row of cip-generic with this parameter, or a computed value that uses it, got none"
+            }
+            (true, false) => {
+                "expected a [[parameter]] row of generic-sercos or generic-cia402, or a [[computed]] row, got none"
+            }
         };
         let problem = Problem::new(code::ROW_MISSING, name.span()).key("name");
         findings.push(&tables.generic.text, problem.expected(expected));

@@ -126,9 +126,8 @@ impl<'g> RowReader<'_, '_, 'g> {
     fn row(&mut self, row: &'g ComputedRow) -> Option<Looked<'g>> {
         let dictionary = self.dictionary;
         let what = "a [[generic.parameter]] with a number from 0x8000";
-        let find = |text: &str| {
-            dictionary.parameter(text).filter(|parameter| parameter.parameter.is_of_vendor())
-        };
+        let find =
+            |text: &str| dictionary.parameter(text).filter(|parameter| parameter.parameter.is_of_vendor());
         let own = dictionary.parameters().iter().filter(|parameter| parameter.parameter.is_of_vendor());
         let own = own.map(|parameter| parameter.name.as_str());
         let parameter = self.resolver.name("parameter", &row.parameter, what, find, own);
@@ -158,12 +157,8 @@ impl<'g> RowReader<'_, '_, 'g> {
 
     /// The one operation of a row.
     fn ways(&mut self, row: &ComputedRow) -> Option<Ways<'g>> {
-        let given = [
-            !row.sum.is_empty(),
-            !row.product.is_empty(),
-            row.ratio.is_some(),
-            !row.selection.is_empty(),
-        ];
+        let given =
+            [!row.sum.is_empty(), !row.product.is_empty(), row.ratio.is_some(), !row.selection.is_empty()];
         if given.iter().filter(|given| **given).count() != 1 {
             let message = "expected one of sum, product, ratio and selection";
             self.contradiction(&row.parameter, "parameter", message);
@@ -274,16 +269,14 @@ impl<'g> RowReader<'_, '_, 'g> {
             return None;
         }
         let mut dimension = Dimension::default();
-        for (named, sign) in over.iter().map(|named| (named, 1)).chain(under.iter().map(|named| (named, -1))) {
+        for (named, sign) in over.iter().map(|named| (named, 1)).chain(under.iter().map(|named| (named, -1)))
+        {
             dimension = dimension.with(Dimension::of(named.quantity()), sign);
         }
         let target = Dimension::of(wanted);
         if dimension.base != target.base {
-            let message = format!(
-                "expected {}, which measures {wanted}, got {}",
-                target.words(),
-                dimension.words()
-            );
+            let message =
+                format!("expected {}, which measures {wanted}, got {}", target.words(), dimension.words());
             let help = "a [[generic.constant]] can have a quantity; `factor` is a bare number";
             self.resolver.helped(code::UNIT, span, key, message, help);
             return None;
@@ -295,7 +288,8 @@ impl<'g> RowReader<'_, '_, 'g> {
             false => Ratio::new(1, power),
         });
         if ratio.is_none() {
-            let message = format!("expected units that are less than 18 decimal places apart, got {decimals}");
+            let message =
+                format!("expected units that are less than 18 decimal places apart, got {decimals}");
             self.resolver.error(code::UNIT, span, key, message);
         }
         ratio
@@ -350,19 +344,26 @@ impl<'g> RowReader<'_, '_, 'g> {
             )),
             _ if count > 1 && row.selection.is_empty() => Some((
                 code::NOT_INVERTIBLE,
-                format!("expected an operand that is there once, {} is there {count} times", writes.get_ref()),
+                format!(
+                    "expected an operand that is there once, {} is there {count} times",
+                    writes.get_ref()
+                ),
             )),
             Some(operand) if !operand.parameter.is_of_vendor() => Some((
                 code::NOT_INVERTIBLE,
                 format!("expected a parameter of your own: {} is set by its own attribute", operand.name),
             )),
             Some(operand) => match (operand.access, parameter.access) {
-                (Access::Read, _) => {
-                    Some((code::READ_ONLY, format!("expected an operand that can be written, {} is only read", operand.name)))
-                }
+                (Access::Read, _) => Some((
+                    code::READ_ONLY,
+                    format!("expected an operand that can be written, {} is only read", operand.name),
+                )),
                 (Access::WriteWhileDisabled, Access::Write) => Some((
                     code::READ_ONLY,
-                    format!("{} is not to be written while the drive has torque: expected `access = \"write_while_disabled\"` of {name}", operand.name),
+                    format!(
+                        "{} is not to be written while the drive has torque: expected `access = \"write_while_disabled\"` of {name}",
+                        operand.name
+                    ),
                 )),
                 _ => None,
             },
@@ -381,7 +382,8 @@ impl<'g> RowReader<'_, '_, 'g> {
             self.resolver.error(code::MISSING_KEY, reason.span(), "saturates", message);
         }
         if parameter.range.is_none() {
-            let message = format!("expected a `range` of {}, at whose ends the value is held", parameter.name);
+            let message =
+                format!("expected a `range` of {}, at whose ends the value is held", parameter.name);
             self.resolver.error(code::CONTRADICTION, reason.span(), "saturates", message);
         }
     }
@@ -473,7 +475,8 @@ impl Builder<'_, '_> {
             reads.iter().position(is)
         });
         if let Some(name) = writes.filter(|_| written.is_none() && !resolver.has_errors()) {
-            let message = format!("expected a parameter that drives have, {} is computed itself", name.get_ref());
+            let message =
+                format!("expected a parameter that drives have, {} is computed itself", name.get_ref());
             resolver.error(code::NOT_INVERTIBLE, name.span(), "writes", message);
         }
         Some(Computation { reads, rows: rows.into_iter().map(|(_, row)| row).collect(), written })

@@ -126,7 +126,8 @@ impl GenericDictionary {
                 || computation.rows.iter().any(|row| row.parameter == known.parameter)
         });
         if !counts && known.parameter.is_of_vendor() {
-            let message = "expected no range for a parameter that is only read, and that no computed value uses";
+            let message =
+                "expected no range for a parameter that is only read, and that no computed value uses";
             resolver.error(code::CONTRADICTION, range.span(), "range", message);
         }
     }

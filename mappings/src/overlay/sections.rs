@@ -49,8 +49,12 @@ const COMPUTED: Section = Section {
     ..section("computed", &["parameter"])
 };
 
-const GENERIC: &[Section] =
-    &[section("signal", &["name"]), section("parameter", &["name"]), section("constant", &["name"]), COMPUTED];
+const GENERIC: &[Section] = &[
+    section("signal", &["name"]),
+    section("parameter", &["name"]),
+    section("constant", &["name"]),
+    COMPUTED,
+];
 
 const CIP_ATTRIBUTES: &[Section] = &[
     section("clauses", &["source"]),

@@ -189,18 +189,34 @@ fn one_operation_with_known_operands() {
     wrong("product = [\"dc_current\", \"dc_voltage\"]\n", "", &["expected one of sum, product, ratio"]);
     let two = "product = [\"dc_current\", \"dc_voltage\"]\nsum = [\"dc_power\"]";
     wrong("product = [\"dc_current\", \"dc_voltage\"]", two, &["AX0015", "expected one of sum"]);
-    wrong("\"dc_current\", \"dc_voltage\"]", "\"dc_curent\", \"dc_voltage\"]", &["AX0010", "did you mean `dc_current`?"]);
-    wrong("\"dc_current\", \"dc_voltage\"]", "\"motor_name\", \"dc_voltage\"]", &["AX0036", "motor_name is a text"]);
+    wrong(
+        "\"dc_current\", \"dc_voltage\"]",
+        "\"dc_curent\", \"dc_voltage\"]",
+        &["AX0010", "did you mean `dc_current`?"],
+    );
+    wrong(
+        "\"dc_current\", \"dc_voltage\"]",
+        "\"motor_name\", \"dc_voltage\"]",
+        &["AX0036", "motor_name is a text"],
+    );
     wrong("by = \"gain_set\"\n", "", &["AX0007", "`by`"]);
     wrong("{ is = 1, take", "{ is = 0, take", &["AX0014", "0 selects something already"]);
-    wrong("parameter = \"dc_load\"\nratio", "parameter = \"energy\"\nratio", &["AX0010", "number from 0x8000"]);
+    wrong(
+        "parameter = \"dc_load\"\nratio",
+        "parameter = \"energy\"\nratio",
+        &["AX0010", "number from 0x8000"],
+    );
     wrong("name = \"filter_tick\"", "name = \"filter_ticks\"", &["AX0014", "of this name is there already"]);
     wrong("rounding = \"nearest\"", "rounding = \"up\"", &["AX0012", "nearest, floor, toward_zero"]);
 }
 
 #[test]
 fn units_agree_at_both_ends() {
-    wrong("quantity = \"power\"", "quantity = \"voltage\"", &["AX0030", "expected V, which measures voltage, got V A"]);
+    wrong(
+        "quantity = \"power\"",
+        "quantity = \"voltage\"",
+        &["AX0030", "expected V, which measures voltage, got V A"],
+    );
     wrong(
         "sum = [\"dc_current_rated\"]",
         "sum = [\"filter_tick\"]",
@@ -214,16 +230,29 @@ fn units_agree_at_both_ends() {
 
 #[test]
 fn results_fit_with_every_value_that_drives_can_have() {
-    wrong("saturates = \"the panel shows one byte, and 255 % means far too much\"\n", "", &[
-        "AX0066", "`parameter`", "0 to 16384", "do not fit 0 to 255",
-    ]);
-    wrong("ratio = [\"dc_current\", \"dc_current_rated\"]", "ratio = [\"dc_current_rated\", \"dc_current\"]", &[
-        "AX0066", "the divisor can be 0",
-    ]);
-    wrong("range = [62_500, 50_000_000]", "range = [62_500, 49_999_999]", &["AX0066", "62500 to 50000000 ns"]);
+    wrong(
+        "saturates = \"the panel shows one byte, and 255 % means far too much\"\n",
+        "",
+        &["AX0066", "`parameter`", "0 to 16384", "do not fit 0 to 255"],
+    );
+    wrong(
+        "ratio = [\"dc_current\", \"dc_current_rated\"]",
+        "ratio = [\"dc_current_rated\", \"dc_current\"]",
+        &["AX0066", "the divisor can be 0"],
+    );
+    wrong(
+        "range = [62_500, 50_000_000]",
+        "range = [62_500, 49_999_999]",
+        &["AX0066", "62500 to 50000000 ns"],
+    );
     wrong("range = [0, 255]\n", "", &["AX0015", "at whose ends the value is held"]);
-    let narrow = EXAMPLE.replace("name = \"DC Power\"\ntype = \"REAL\"", "name = \"DC Power\"\ntype = \"UINT\"");
-    assert!(checked(&narrow).iter().any(|found| found.contains("do not fit a UINT")), "{:?}", checked(&narrow));
+    let narrow =
+        EXAMPLE.replace("name = \"DC Power\"\ntype = \"REAL\"", "name = \"DC Power\"\ntype = \"UINT\"");
+    assert!(
+        checked(&narrow).iter().any(|found| found.contains("do not fit a UINT")),
+        "{:?}",
+        checked(&narrow)
+    );
 }
 
 #[test]
@@ -231,10 +260,16 @@ fn only_one_operand_of_ones_own_is_written() {
     wrong("writes = \"filter_ticks\"\n", "", &["AX0068", "expected `writes`"]);
     wrong("writes = \"filter_ticks\"", "writes = \"filter_tick\"", &["AX0068", "which a drive can take"]);
     wrong("writes = \"filter_ticks\"", "writes = \"gain_a\"", &["AX0068", "one of the operands"]);
-    wrong("[\"filter_ticks\", \"filter_tick\"]", "[\"filter_ticks\", \"filter_ticks\"]", &["AX0068", "there 2 times"]);
-    wrong("parameter = \"dc_power\"\n", "parameter = \"dc_power\"\nwrites = \"dc_current\"\n", &[
-        "AX0015", "dc_power is only read",
-    ]);
+    wrong(
+        "[\"filter_ticks\", \"filter_tick\"]",
+        "[\"filter_ticks\", \"filter_ticks\"]",
+        &["AX0068", "there 2 times"],
+    );
+    wrong(
+        "parameter = \"dc_power\"\n",
+        "parameter = \"dc_power\"\nwrites = \"dc_current\"\n",
+        &["AX0015", "dc_power is only read"],
+    );
     wrong("writes = \"gain_a\"", "writes = \"gain_set\"", &["AX0068", "one of the operands"]);
     let disabled = EXAMPLE.replace(
         "name = \"filter_ticks\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"write\"",
@@ -250,7 +285,8 @@ fn values_that_need_each_other_are_refused_once() {
         parameter(0x8031, "one", "read", ""),
         parameter(0x8032, "two", "read", ""),
         "[[generic.computed]]\nparameter = \"one\"\nsum = [\"two\", \"gain_a\"]\nsource = \"x\"\n".to_owned(),
-        "[[generic.computed]]\nparameter = \"two\"\nproduct = [\"one\", \"gain_b\"]\nsource = \"x\"\n".to_owned(),
+        "[[generic.computed]]\nparameter = \"two\"\nproduct = [\"one\", \"gain_b\"]\nsource = \"x\"\n"
+            .to_owned(),
     ];
     let found = checked(&format!("{EXAMPLE}\n{}", rows.concat()));
     let cycles: Vec<_> = found.iter().filter(|found| found.contains("AX0067")).collect();
@@ -260,14 +296,17 @@ fn values_that_need_each_other_are_refused_once() {
 
 #[test]
 fn a_computed_value_is_in_no_drive_and_its_operands_are_in_one() {
-    let row = "[[generic-cia402.parameter]]\nparameter = \"filter_time\"\nobject = \"2060:00\"\n\
+    let row = "[[generic-sercos.parameter]]\nparameter = \"gain_in_force\"\nidn = \"P-0-0714\"\n\
                direction = \"both\"\nmissing = \"reject\"\nsource = \"x\"\n";
     wrong_rows(row, &["AX0015", "the value is computed"]);
     let start = EXAMPLE.find("[[generic-cia402.parameter]]").unwrap();
     let end = start + EXAMPLE[start..].find("# --- ").unwrap();
     let without = format!("{}{}", &EXAMPLE[..start], &EXAMPLE[end..]);
     let found = checked(&without);
-    assert!(found.iter().any(|found| found.contains("AX0016") && found.contains("filter_ticks")), "{found:?}");
+    assert!(
+        found.iter().any(|found| found.contains("AX0016") && found.contains("filter_ticks")),
+        "{found:?}"
+    );
     // A range of what is only read has to be of use.
     let useless = parameter(0x8031, "alone", "read", "range = [0, 5]");
     wrong_rows(&useless, &["AX0015", "no computed value uses"]);

@@ -359,11 +359,11 @@ fn changes_of_a_vendors_parameter_are_told_and_what_widens_is_dangerous() {
         told("decimals = 1", "decimals = 0"),
         said("type [[idn]] P-0-0702: unsigned, 2 bytes, 1 decimals -> unsigned, 2 bytes, 0 decimals", true)
     );
+    assert_eq!(told("type = \"u16\"", "type = \"u32\""), said("type [[object]] 2051:00: u16 -> u32", true));
     assert_eq!(
-        told("type = \"u16\"", "type = \"u32\""),
-        said("type [[object]] 2051:00: u16 -> u32", true)
+        told("value = 3", "value = 4"),
+        said("binding [[attribute]] Notch Filters: constant 3 -> constant 4", true)
     );
-    assert_eq!(told("value = 3", "value = 4"), said("binding [[attribute]] Notch Filters: constant 3 -> constant 4", true));
     // The way back: what is allowed again is more.
     let wider = |from: &str, to: &str| {
         let ((old, _), (new, texts)) = (mapping(from, to), mapping("", ""));
@@ -395,6 +395,12 @@ fn changes_of_computed_values_are_told() {
         ("scale [[computed]] dc_load: dc_current over dc_current_rated, times 100/1, rounded nearest, saturates -> \
           dc_current over dc_current_rated, times 1000/1, rounded nearest, saturates".to_owned(), true)
     );
-    assert_eq!(told("value = 40_000_000", "value = 50_000_000"), ("scale [[constant]] dc_current_rated: 40000000 -> 50000000".to_owned(), true));
-    assert_eq!(told("writes = \"gain_a\"", "writes = \"gain_b\""), ("binding [[computed]] gain_in_force: writes gain_a -> writes gain_b".to_owned(), true));
+    assert_eq!(
+        told("value = 40_000_000", "value = 50_000_000"),
+        ("scale [[constant]] dc_current_rated: 40000000 -> 50000000".to_owned(), true)
+    );
+    assert_eq!(
+        told("writes = \"gain_a\"", "writes = \"gain_b\""),
+        ("binding [[computed]] gain_in_force: writes gain_a -> writes gain_b".to_owned(), true)
+    );
 }

@@ -3,6 +3,7 @@
 
 use axisbridge::engine::local::{ClientEnd, Failure, LocalNorth, Order, Request};
 use axisbridge::engine::parameter::ParameterFailure;
+use axisbridge::engine::registers::{RegisterEnd, RegisterFailure, RegisterNorth, RegisterRequest};
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
@@ -102,6 +103,8 @@ fn a_vendors_parameter_is_refused_where_the_drive_does_not_take_it() {
 fn a_vendors_parameter_is_not_answered_without_its_drive() {
     let (mut rig, client) = on_sercos(Some(NOTCH_WRITABLE));
     rig.cable = false;
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(100.0)).0, DEVICE_CONFLICT);
+    // The gateway has noticed by now.
     assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(100.0)).0, DEVICE_CONFLICT);
     assert_eq!(rig.line.slaves()[0].store().number_of(idn()), 1_200);
 }
@@ -206,8 +209,53 @@ fn a_vendors_parameter_is_read_and_written_by_local_control() {
     assert_eq!(access(&mut rig, &mut end, me, None), Ok(Some(200_000)));
     assert_eq!(held(&rig), 2_000);
     rig.cable = false;
-    assert_eq!(
-        access(&mut rig, &mut end, me, None),
-        Err(Failure::Parameter(ParameterFailure::Unanswered))
-    );
+    assert_eq!(access(&mut rig, &mut end, me, None), Err(Failure::Parameter(ParameterFailure::Unanswered)));
+}
+
+/// Reads the parameter of the first axis as a register, or writes it.
+fn register(rig: &mut Rig, end: &mut RegisterEnd, wanted: Option<i64>) -> Result<i64, RegisterFailure> {
+    let request = RegisterRequest { id: 3, axis: 0, parameter: NOTCH_PARAMETER, wanted };
+    end.requests.push(request).expect("room");
+    for _ in 0..5_000 {
+        if let Ok(answer) = end.answers.pop() {
+            assert_eq!(answer.id, 3);
+            return answer.result;
+        }
+        rig.run_for(millis(1));
+    }
+    panic!("no answer: {}", rig.told());
+}
+
+#[test]
+fn a_vendors_parameter_is_read_and_written_as_a_register_while_nobody_has_the_axis() {
+    let mut rig = Rig::new(Settings { overlays: vec![OVERLAY], ..Settings::default() });
+    let notch = Definition::value(idn(), NOTCH_WRITABLE, "Notch filter frequency", 1_200);
+    rig.line.slaves_mut()[0].store_mut().define(notch.unit("Hz").range(600, 30_000));
+    let (registers, mut end) = RegisterNorth::new();
+    rig.engine.set_registers(registers);
+    let (local, mut client) = LocalNorth::new(rig.engine.axes().len());
+    rig.engine.set_local(local);
+    rig.until_ready();
+    rig.run_for(millis(200));
+    let held = |rig: &Rig| rig.line.slaves()[0].store().number_of(idn());
+    assert_eq!(register(&mut rig, &mut end, None), Ok(120_000));
+    assert_eq!(register(&mut rig, &mut end, Some(250_000)), Ok(250_000));
+    assert_eq!(held(&rig), 2_500);
+    // Beyond the row, and beyond the drive.
+    for refused in [2_000_001, 49_999, 55_000] {
+        let value = Err(RegisterFailure::Parameter(ParameterFailure::Value));
+        assert_eq!(register(&mut rig, &mut end, Some(refused)), value, "{refused}");
+    }
+    let owned = Err(RegisterFailure::Owned);
+    client.requests.push(Request::Order { client: 2, id: 8, axis: 0, order: Order::Enable }).expect("room");
+    rig.run_until(millis(5_000), "an enabled axis", |rig| {
+        rig.engine.axes()[0].state() == DriveState::Operating
+    });
+    assert_eq!(register(&mut rig, &mut end, Some(100_000)), owned);
+    rig.connect(vec![Step::Dwell { seconds: 1_000.0 }]);
+    rig.run_until(millis(60_000), "a controller", |rig| rig.engine.axes()[0].has_controller());
+    rig.run_for(millis(100));
+    assert_eq!(register(&mut rig, &mut end, Some(100_000)), owned);
+    assert_eq!(register(&mut rig, &mut end, None), Ok(250_000));
+    assert_eq!(held(&rig), 2_500);
 }

@@ -5,6 +5,7 @@ use profile_cip::device::attribute_worker::{AccessOperation, AttributeAccess};
 use profile_cip::device::motion_device::MotionDevice;
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::parameter::Parameter;
+use profile_generic::state::Report;
 
 use super::refusal::{parameter_refusal, refusal};
 use super::scaling::signal_octets;
@@ -98,7 +99,11 @@ impl Accesses {
         let (ticket, attribute) = (access.ticket, access.id);
         let purpose = Purpose::Attribute { ticket, device: on.number, attribute, write };
         if !buses.access(on.axis_number, &request, purpose) {
-            return Err(GeneralStatus::RESOURCE_UNAVAILABLE);
+            let is_gone = on.axis.feedback().report == Report::Silent;
+            return Err(match is_gone {
+                true => GeneralStatus::DEVICE_STATE_CONFLICT,
+                false => GeneralStatus::RESOURCE_UNAVAILABLE,
+            });
         }
         self.note_write(access, &mapping.cip.sequence);
         Ok(())
@@ -132,7 +137,11 @@ impl Accesses {
             |_, job| job.next(mapping, axis),
             |what, request| {
                 let Computed { ticket, attribute, write } = *what;
-                buses.access(axis_number, request, Purpose::Attribute { ticket, device: number, attribute, write })
+                buses.access(
+                    axis_number,
+                    request,
+                    Purpose::Attribute { ticket, device: number, attribute, write },
+                )
             },
             |what, result| {
                 let mut bytes = [0; 8];
@@ -270,11 +279,7 @@ impl Accessed<'_> {
 }
 
 /// A generic value as the attribute; its length.
-fn shown(
-    entry: Option<&AttributeEntry>,
-    generic: i64,
-    bytes: &mut [u8; 8],
-) -> Result<usize, GeneralStatus> {
+fn shown(entry: Option<&AttributeEntry>, generic: i64, bytes: &mut [u8; 8]) -> Result<usize, GeneralStatus> {
     let entry = entry.ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
     match entry.from_generic(generic, bytes) {
         Ok((len, false)) => Ok(len),

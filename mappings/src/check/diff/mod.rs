@@ -17,6 +17,8 @@ use crate::finding::{Source, Spanned};
 use crate::format::{FieldValueRow, Name, RatioRow, UnitRow, listed};
 use crate::{Mapping, TableTexts};
 
+pub(super) use vendor::computation;
+
 /// What a change is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Aspect {
@@ -285,7 +287,8 @@ impl<'m> Reader<'m> {
         span: Range<usize>,
     ) -> &mut Fact<'m> {
         let (source, table, id) = (self.source, self.table, id.to_owned());
-        let fact = Fact { source, table, list, id, aspect, says: says.into(), number: None, reach: None, span };
+        let fact =
+            Fact { source, table, list, id, aspect, says: says.into(), number: None, reach: None, span };
         let place = self.facts.len();
         self.facts.push(fact);
         &mut self.facts[place]

@@ -56,8 +56,8 @@ fn own(mapping: &Mapping) -> Vec<Fact<'_>> {
     reader.facts
 }
 
-/// What a computed value is.
-fn computation(row: &ComputedRow) -> String {
+/// How a value is computed, in words.
+pub(in crate::check) fn computation(row: &ComputedRow) -> String {
     let mut says = String::new();
     if !row.sum.is_empty() {
         says = format!("sum of {}", listed(&row.sum));
@@ -117,9 +117,9 @@ fn idns(mapping: &Mapping) -> Vec<Fact<'_>> {
     let bound = &mapping.tables().generic_sercos.rows.parameter;
     let mut reader = Reader::new(&file.text, "sercos-idns");
     for row in &file.rows.idn {
-        let is_bound = bound.iter().any(|known| {
-            known.idn.get_ref() == row.idn.get_ref() && is_of_vendor(mapping, &known.parameter)
-        });
+        let is_bound = bound
+            .iter()
+            .any(|known| known.idn.get_ref() == row.idn.get_ref() && is_of_vendor(mapping, &known.parameter));
         let Some(format) = row.format.as_ref().filter(|_| is_bound) else { continue };
         let length = row.length.as_ref().map_or(0, |length| *length.get_ref());
         let decimals = row.decimals.as_ref().map_or(0, |decimals| *decimals.get_ref());
@@ -155,13 +155,7 @@ fn objects(mapping: &Mapping) -> Vec<Fact<'_>> {
 }
 
 /// How a value is held at one end.
-fn held(
-    reader: &mut Reader<'_>,
-    id: (&'static str, &str),
-    kind: &Name,
-    unit: Option<&Name>,
-    more: &str,
-) {
+fn held(reader: &mut Reader<'_>, id: (&'static str, &str), kind: &Name, unit: Option<&Name>, more: &str) {
     let span: Range<usize> = kind.span();
     reader.say(id, Aspect::Type, format!("{}{more}", kind.get_ref()), span);
     reader.say(id, Aspect::Unit, text(unit), unit.map_or(kind.span(), Name::span));
