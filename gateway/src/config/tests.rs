@@ -65,7 +65,10 @@ fn broken(old: &str, new: &str) -> String {
 fn defaults_are_those_of_the_documentation() {
     let config = good();
     assert_eq!(config.name, "press");
-    assert_eq!((config.time, config.log_level, config.modbus.clone()), (TimeSource::Host, LogLevel::Info, None));
+    assert_eq!(
+        (config.time, config.log_level, config.modbus.clone()),
+        (TimeSource::Host, LogLevel::Info, None)
+    );
     assert_eq!((&config.mappings_dir, &config.settings_file, config.overlays.len()), (&None, &None, 0));
     let device = &config.devices[0];
     assert_eq!(

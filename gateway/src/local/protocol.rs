@@ -117,13 +117,8 @@ pub enum BadRequest {
         name: String,
     },
     /// The text is not a whole number.
-    #[error("`{text}` is not a whole number in {unit} of 64 bits")]
-    Whole {
-        /// The text.
-        text: String,
-        /// The unit of the parameter.
-        unit: &'static str,
-    },
+    #[error("`{0}` is not a whole number of 64 bits")]
+    Whole(String),
     /// A value is missing.
     #[error("`{word}` needs {what}")]
     Missing {
@@ -216,11 +211,7 @@ fn access<'a>(
         return Ok(Request::Parameter { axis, parameter, wanted: None });
     }
     let text = words.next().ok_or(BadRequest::Missing { word, what: "a value" })?;
-    let unit = match parameters[parameter].unit {
-        "" => "counts",
-        unit => unit,
-    };
-    let wanted = text.parse().map_err(|_| BadRequest::Whole { text: text.to_owned(), unit })?;
+    let wanted = text.parse().map_err(|_| BadRequest::Whole(text.to_owned()))?;
     Ok(Request::Parameter { axis, parameter, wanted: Some(wanted) })
 }
 

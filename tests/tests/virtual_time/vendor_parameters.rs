@@ -259,3 +259,56 @@ fn a_vendors_parameter_is_read_and_written_as_a_register_while_nobody_has_the_ax
     assert_eq!(register(&mut rig, &mut end, None), Ok(250_000));
     assert_eq!(held(&rig), 2_500);
 }
+
+/// The same parameter where drives have it as floating point numbers of 32 bits.
+fn in_real32() -> &'static str {
+    let sercos = ("length = 2\nformat = \"unsigned\"\ndecimals = 1", "length = 4\nformat = \"float\"");
+    let can = ("type = \"u16\"", "type = \"f32\"");
+    assert!(OVERLAY.contains(sercos.0) && OVERLAY.contains(can.0));
+    Box::leak(OVERLAY.replacen(sercos.0, sercos.1, 1).replacen(can.0, can.1, 1).into_boxed_str())
+}
+
+/// A number as a drive keeps it in four bytes.
+fn bits(value: f32) -> i64 {
+    i64::from(value.to_bits())
+}
+
+#[test]
+fn a_vendors_parameter_is_a_floating_point_number_in_a_sercos_drive() {
+    let mut rig = Rig::new(Settings { overlays: vec![in_real32()], ..Settings::default() });
+    // Four bytes, floating point.
+    let notch = Definition::value(idn(), 0x0062_0001, "Notch filter frequency", bits(120.25));
+    rig.line.slaves_mut()[0].store_mut().define(notch.unit("Hz"));
+    let (mut rig, client) = reached(rig);
+    let held = |rig: &Rig| rig.line.slaves()[0].store().number_of(idn());
+    assert_eq!(client.ask(&mut rig, GET, 1, NOTCH, &[]), (0, hertz(120.25)));
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(333.3)), OK);
+    assert_eq!(held(&rig), bits(333.3));
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(2_000.5)).0, INVALID_VALUE);
+    // What is no number is not answered as one.
+    for none in [f32::NAN, f32::INFINITY, 1e30] {
+        let store = rig.line.slaves_mut()[0].store_mut();
+        let handle = store.find(idn()).expect("the drive has it");
+        store.set_number(handle, bits(none));
+        assert_eq!(client.ask(&mut rig, GET, 1, NOTCH, &[]).0, DEVICE_CONFLICT, "{none}");
+    }
+}
+
+#[test]
+fn a_vendors_parameter_is_a_floating_point_number_in_a_canopen_drive() {
+    let configuration = include_str!("can.toml").to_owned();
+    let settings =
+        Settings { configuration, drives: Vec::new(), overlays: vec![in_real32()], ..Settings::default() };
+    let mut rig = Rig::new(settings);
+    let notch = dictionary::Definition::new("Notch filter frequency", DataType::U32, bits(120.25));
+    let node = rig.can[0].bus.nodes_mut().next().expect("a device");
+    node.dictionary_mut().add(Mux::new(0x2051, 0), notch);
+    let (mut rig, client) = reached(rig);
+    let held =
+        |rig: &mut Rig| rig.can[0].bus.nodes_mut().next().expect("a device").dictionary().number(0x2051, 0);
+    assert_eq!(client.ask(&mut rig, GET, 1, NOTCH, &[]), (0, hertz(120.25)));
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(333.3)), OK);
+    assert_eq!(held(&mut rig), bits(333.3));
+    assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(49.9)).0, INVALID_VALUE);
+    assert_eq!(held(&mut rig), bits(333.3));
+}

@@ -39,8 +39,7 @@ fn parameters(
     for (place, row) in table.parameter.iter().map(Spanned::get_ref).enumerate() {
         let register =
             value::number(problems, &row.register, "the register", i64::from(MAP_LEN)..=REGISTER_MAX);
-        let kind =
-            value::word_or(problems, row.kind.as_ref(), "a type of registers", &REGISTER_KINDS, Kind::I32);
+        let kind = value::word_or(problems, row.kind.as_ref(), "type", &REGISTER_KINDS, Kind::I32);
         let axis = names().position(|name| name == row.axis.get_ref());
         if axis.is_none() {
             problems.unknown("axis", &row.axis, names());
@@ -87,7 +86,7 @@ mod tests {
     #[test]
     fn parameters_have_registers_of_their_own_behind_the_map() {
         let table = "listen = \"127.0.0.1:502\"\n\n[[parameter]]\nregister = 4159\naxis = \"x\"\nparameter = \"a\"\ntype = \"f32\"\n";
-        let wrong = ["the register is 4159", "`f32` is not a type of registers", "there is no axis `x`"];
+        let wrong = ["the register is 4159", "unknown type `f32`", "there is no axis `x`"];
         assert_eq!(checked(table, without_axes), Err(wrong.map(str::to_owned).to_vec()));
     }
 }
