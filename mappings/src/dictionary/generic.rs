@@ -221,11 +221,9 @@ fn of_vendor(resolver: &mut Resolver<'_>, row: &GenericParameterRow) -> Option<G
     let accesses = Access::ALL.iter().map(|access| access.name());
     let access = resolver.name("access", &row.access, "an access", Access::parse, accesses);
     let range = row.range.as_ref().map(|range| (range, *range.get_ref()));
-    if let Some((at, [low, high])) = range {
-        if low > high {
-            let message = format!("expected the least value first, got [{low}, {high}]");
-            resolver.error(code::OUT_OF_RANGE, at.span(), "range", message);
-        }
+    if let Some((at, [low, high])) = range.filter(|(_, [low, high])| low > high) {
+        let message = format!("expected the least value first, got [{low}, {high}]");
+        resolver.error(code::OUT_OF_RANGE, at.span(), "range", message);
     }
     Some(GenericParameter {
         parameter: Parameter(*row.number.as_ref()?.get_ref()),
