@@ -26,7 +26,7 @@ fn what_is_shipped_is_good() {
         let output = check(&["--config", config, "--mappings", "examples/overlays"]);
         assert_eq!(output.status.code(), Some(0), "{}", out(&output));
         assert!(
-            out(&output).contains("checked the tables, those of 7 families of drives, 7 overlays, 2 axes"),
+            out(&output).contains("checked the tables, those of 7 families of drives, 8 overlays, 2 axes"),
             "{}",
             out(&output)
         );

@@ -83,16 +83,46 @@ impl ParameterEntry {
     /// The bytes as the drive keeps them; those that count, and whether the value was clamped. `None` when the
     /// parameter cannot be written.
     pub fn encode(&self, generic: i64) -> Option<([u8; 8], usize, bool)> {
-        let outcome = self.to_drive?.convert(generic);
-        let (min, max) = self.width.range();
-        let value = outcome.value.clamp(min, max);
-        Some((value.to_le_bytes(), self.width.bytes(), outcome.saturated || value != outcome.value))
+        let to_drive = self.to_drive?;
+        let mut bytes = [0; 8];
+        let clamped = match self.width {
+            Width::F32 => {
+                let (outcome, saturated) = to_drive.convert_to_f32(generic);
+                bytes[..4].copy_from_slice(&outcome.value.to_le_bytes());
+                saturated
+            }
+            Width::F64 => {
+                let (outcome, saturated) = to_drive.convert_to_f64(generic);
+                bytes = outcome.value.to_le_bytes();
+                saturated
+            }
+            _ => {
+                let outcome = to_drive.convert(generic);
+                let (min, max) = self.width.range();
+                let value = outcome.value.clamp(min, max);
+                bytes = value.to_le_bytes();
+                outcome.saturated || value != outcome.value
+            }
+        };
+        Some((bytes, self.width.bytes(), clamped))
     }
 
     /// The generic value of the bytes that the drive keeps. `None` when the parameter cannot be read or has another
-    /// length.
+    /// length, and for a floating point number that is none or does not fit.
     pub fn decode(&self, data: &[u8]) -> Option<i64> {
-        Some(self.from_drive?.convert(self.width.integer(data)?).value)
+        let from_drive = self.from_drive?;
+        let real = match (self.width, data) {
+            (Width::F32, &[a, b, c, d]) => Some(f64::from(f32::from_le_bytes([a, b, c, d]))),
+            (Width::F64, &[a, b, c, d, e, f, g, h]) => Some(f64::from_le_bytes([a, b, c, d, e, f, g, h])),
+            _ => None,
+        };
+        match real {
+            Some(real) => {
+                let outcome = from_drive.convert_f64(real).filter(|outcome| !outcome.saturated);
+                outcome.map(|outcome| outcome.value)
+            }
+            None => Some(from_drive.convert(self.width.integer(data)?).value),
+        }
     }
 }
 

@@ -66,6 +66,7 @@ mod cip_events;
 mod cip_scaling;
 mod cip_tables;
 mod compile_cip;
+mod computed;
 mod definitions;
 mod device_link;
 pub mod devicenet;
@@ -116,6 +117,7 @@ pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
     MissingValue,
 };
+pub use computed::{Computation, Known, NoValue, Operand, Operation, READS_MAX, ROWS_MAX, Read, Row};
 pub use device_link::Told;
 pub use dictionary::{
     Access, Cia402Access, Cia402Category, Cia402Class, Cia402Code, Cia402CodeSet, Cia402Dictionary,

@@ -120,6 +120,10 @@ impl Mapping {
         for entry in table.entries() {
             let Backing::Parameter { parameter, to_generic, .. } = entry.backing else { continue };
             let Some(row) = program.parameter(parameter) else { continue };
+            // A floating point number in the drive has neither counts nor ends that matter.
+            if row.width.is_float() {
+                continue;
+            }
             let (outward, inward) = match (row.to_drive, row.from_drive) {
                 (Some(outward), Some(inward)) => (outward, inward),
                 (Some(outward), None) => (outward, outward.inverse().unwrap_or(outward)),

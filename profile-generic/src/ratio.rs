@@ -304,6 +304,16 @@ impl fmt::Debug for Ratio {
     }
 }
 
+/// A quotient of whole numbers of up to 127 bits, rounded once and clamped to 64 bits. `None` for a divisor of zero, and where a
+/// term is -2^127.
+pub const fn quotient(num: i128, den: i128, rounding: Rounding) -> Option<Outcome> {
+    match (num.checked_neg(), den.checked_neg()) {
+        (_, Some(0)) | (None, _) | (_, None) => None,
+        (Some(_), Some(_)) if den > 0 => Some(clamp(divide(num, den, rounding))),
+        (Some(num), Some(den)) => Some(clamp(divide(num, den, rounding))),
+    }
+}
+
 const fn gcd(mut a: u128, mut b: u128) -> u128 {
     while b != 0 {
         (a, b) = (b, a % b);

@@ -11,6 +11,7 @@ mod can_bus;
 mod devicenet_bus;
 mod frames;
 mod marks;
+mod modbus;
 pub mod schema;
 
 use std::path::{Path, PathBuf};
@@ -74,6 +75,7 @@ fn axes(tables: &mapping::check::Outcome, written: &Written, findings: &mut Find
         bus::check(mapping, written, &mut findings);
         can_bus::check(mapping, written, &mut findings);
         devicenet_bus::check(mapping, written, &mut findings);
+        modbus::check(mapping, written, &mut findings);
         findings
     };
     let own = tables.mapping.as_ref().map(of);

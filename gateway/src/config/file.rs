@@ -100,6 +100,30 @@ pub struct ModbusTable {
     /// Clients that can be connected at the same time, 1 to 64. Default: 8.
     #[schemars(range(min = 1, max = 64))]
     pub clients_max: Option<Spanned<i64>>,
+    /// Registers that are parameters of drives, at most 256.
+    #[serde(default)]
+    #[schemars(length(max = 256))]
+    pub parameter: Vec<Spanned<ModbusParameterTable>>,
+}
+
+/// `[[modbus.parameter]]`
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ModbusParameterTable {
+    /// The first register, 4160 to 65532.
+    #[schemars(range(min = 4160, max = 65_532))]
+    pub register: Spanned<i64>,
+    /// Size and sign of the value: `u16`, `i32` (default), `u32` or `i64`, in 1, 2, 2 or 4 registers.
+    #[serde(rename = "type")]
+    #[schemars(transform = form::word(&check::modbus::REGISTER_KINDS))]
+    pub kind: Option<Spanned<String>>,
+    /// The axis whose drive has the parameter.
+    pub axis: Spanned<String>,
+    /// The parameter, which an overlay defines.
+    pub parameter: Spanned<String>,
+    /// Whether clients may write it while nobody controls the axis. Default: false.
+    #[serde(default)]
+    pub write: bool,
 }
 
 /// `[mappings]`

@@ -33,6 +33,7 @@ pub use self::sercos::{Drive, Link, Sercos};
 use crate::finding::{Findings, Problem, Source, partial, read_file, registry as code, tree};
 
 pub use self::named::Named;
+use crate::modbus::map::Kind;
 use crate::sys::realtime;
 
 /// Axes of one box: what its status block, its register map and its cycle have room for. A device has at most 16 of
@@ -311,12 +312,29 @@ impl LogLevel {
 }
 
 /// The Modbus TCP server.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Modbus {
     /// Where it listens.
     pub listen: SocketAddr,
     /// Clients served at once.
     pub clients_max: u8,
+    /// Registers that are parameters of drives.
+    pub parameters: Vec<ModbusParameter>,
+}
+
+/// Registers that are a parameter of a drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModbusParameter {
+    /// The first register.
+    pub register: u16,
+    /// Size and sign of the value.
+    pub kind: Kind,
+    /// Position of the axis, from 0.
+    pub axis: usize,
+    /// Name of the parameter in the tables.
+    pub parameter: String,
+    /// Whether clients may write it.
+    pub write: bool,
 }
 
 #[cfg(test)]

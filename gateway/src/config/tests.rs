@@ -65,7 +65,10 @@ fn broken(old: &str, new: &str) -> String {
 fn defaults_are_those_of_the_documentation() {
     let config = good();
     assert_eq!(config.name, "press");
-    assert_eq!((&config.time, config.log_level, config.modbus), (&Time::default(), LogLevel::Info, None));
+    assert_eq!(
+        (&config.time, config.log_level, config.modbus.clone()),
+        (&Time::default(), LogLevel::Info, None)
+    );
     assert_eq!((&config.mappings_dir, &config.settings_file, config.overlays.len()), (&None, &None, 0));
     let device = &config.devices[0];
     assert_eq!(
@@ -162,7 +165,10 @@ fn values_given_are_taken() {
         .replace("address = 2", "address = 511\nset_scaling = true\nacknowledges = false\nrated_torque = \"2.5 Nm\"\nhot_plug = true");
     let config = Config::parse(&text, "box.toml").unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(config.log_level, LogLevel::Debug);
-    assert_eq!(config.modbus, Some(Modbus { listen: "[::1]:502".parse().unwrap(), clients_max: 3 }));
+    assert_eq!(
+        config.modbus,
+        Some(Modbus { listen: "[::1]:502".parse().unwrap(), clients_max: 3, parameters: Vec::new() })
+    );
     assert_eq!(config.mappings_dir.as_deref(), Some(Path::new("maps")));
     let device = &config.devices[0];
     assert_eq!(device.listen, Ipv4Addr::new(192, 0, 2, 10));

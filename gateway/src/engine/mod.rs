@@ -29,8 +29,10 @@ mod ending;
 pub mod local;
 pub mod north;
 pub mod notice;
+pub mod parameter;
 pub mod port;
 mod publication;
+pub mod registers;
 mod schedule;
 
 use std::cell::RefCell;
@@ -52,6 +54,7 @@ use self::north::{Exchange, North};
 use self::notice::Notice;
 use self::port::{NorthPort, SouthPort};
 use self::publication::{Publication, Sources};
+use self::registers::RegisterNorth;
 pub use self::schedule::BUSES_MAX;
 use self::schedule::{IDLE_INTERVAL, Schedule};
 use crate::latest::Publisher;
@@ -69,6 +72,8 @@ pub struct Engine {
     devices: Vec<DeviceChannel>,
     /// Local control, if the gateway offers it.
     local: Option<LocalNorth>,
+    /// Registers that are parameters of drives, if there are some.
+    registers: Option<RegisterNorth>,
     axes: Vec<AxisChannel>,
     notices: rtrb::Producer<Notice>,
     schedule: Schedule,
@@ -113,6 +118,7 @@ impl Engine {
             buses,
             devices,
             local: None,
+            registers: None,
             axes,
             notices,
         }
@@ -121,6 +127,17 @@ impl Engine {
     /// Adds local control; to be called before the first cycle.
     pub fn set_local(&mut self, local: LocalNorth) {
         self.local = Some(local);
+    }
+
+    /// Adds registers that are parameters of drives; to be called before the first cycle.
+    pub fn set_registers(&mut self, registers: RegisterNorth) {
+        self.registers = Some(registers);
+    }
+
+    /// The mapping tables.
+    #[must_use]
+    pub fn mapping(&self) -> &Mapping {
+        &self.mapping
     }
 
     /// The axes in the order of the configuration.
@@ -296,7 +313,7 @@ impl Engine {
 
     /// Takes what came from controllers, and lets controllers and axes exchange their values.
     fn serve_norths(&mut self, now: MonotonicTime, north: &mut [&mut dyn NorthPort]) {
-        let Self { devices, local, mapping, axes, buses, notices, clock, ending, .. } = self;
+        let Self { devices, local, registers, mapping, axes, buses, notices, clock, ending, .. } = self;
         let time = &clock.base;
         for (channel, port) in devices.iter_mut().zip(north.iter_mut()) {
             channel.receive(now, time, &mut **port);
@@ -306,6 +323,10 @@ impl Engine {
         let mut exchange = Exchange { now, time, mapping, ending: ending.has_begun, axes, notice };
         if let Some(local) = local {
             local.exchange(&mut exchange);
+            local.parameters(mapping, exchange.axes, buses);
+        }
+        if let Some(registers) = registers {
+            registers.exchange(mapping, (exchange.axes, exchange.ending), buses);
         }
         for channel in devices {
             channel.exchange(&mut exchange);
@@ -344,7 +365,7 @@ impl Engine {
 
     fn run_buses(&mut self, now: MonotonicTime) {
         let system = self.clock.base.system_at(now);
-        let Self { mapping, buses, devices, axes, notices, .. } = self;
+        let Self { mapping, buses, devices, local, registers, axes, notices, .. } = self;
         let idle = devices.iter().all(|channel| channel.device().connection().is_none())
             && axes.iter().all(|axis| axis.owner() != Owner::Local);
         // Both closures push notices, never at the same time.
@@ -352,7 +373,8 @@ impl Engine {
         let mut notice = |notice| push(&mut notices.borrow_mut(), notice);
         let mut hand_on = |axes: &mut [AxisChannel], answer| {
             let notice = &mut |notice| push(&mut notices.borrow_mut(), notice);
-            hand_on((now, system), devices, axes, answer, notice);
+            let norths = Norths { devices, local: local.as_mut(), registers: registers.as_mut() };
+            hand_on((now, system), norths, axes, answer, notice);
         };
         for bus in buses.iter_mut() {
             bus.set_idle(idle);
@@ -361,10 +383,17 @@ impl Engine {
     }
 }
 
+/// Who asks drives.
+struct Norths<'a> {
+    devices: &'a mut [DeviceChannel],
+    local: Option<&'a mut LocalNorth>,
+    registers: Option<&'a mut RegisterNorth>,
+}
+
 /// Hands the answer of a drive to whom has asked.
 fn hand_on(
     (now, system): (MonotonicTime, SystemTime),
-    devices: &mut [DeviceChannel],
+    norths: Norths<'_>,
     axes: &mut [AxisChannel],
     answer: Answer,
     notice: &mut dyn FnMut(Notice),
@@ -373,7 +402,17 @@ fn hand_on(
     let axis = &mut axes[answer.axis];
     match answer.purpose {
         Purpose::Attribute { .. } => {
-            devices.iter_mut().any(|channel| channel.answer(&answer, axes));
+            norths.devices.iter_mut().any(|channel| channel.answer(&answer, axes));
+        }
+        Purpose::LocalParameter(ticket) => {
+            if let Some(local) = norths.local {
+                local.parameter_answered(ticket, &answer, axis);
+            }
+        }
+        Purpose::RegisterParameter(ticket) => {
+            if let Some(registers) = norths.registers {
+                registers.answered(ticket, &answer, axis);
+            }
         }
         Purpose::Diagnosis => axis.diagnostic_word(now, system, answer.item, data.ok().and_then(unsigned)),
         Purpose::DiagnosticMessage => {

@@ -6,15 +6,18 @@
 //!           error WORD AXIS CODE: TEXT
 //! ```
 //!
-//! Values are decimal numbers in the units of the axis: revolutions or millimetres, and seconds.
+//! Values are decimal numbers in the units of the axis: revolutions or millimetres, and seconds. Those of parameters are whole
+//! numbers in the unit of the parameter.
 
 use std::fmt::Write as _;
 
+use profile_generic::parameter::{Access, Parameter};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 
 use crate::config::AxisKind;
 use crate::engine::local::{Failure, Generator, Jog, Move, Order};
+use crate::mapping::Mapping;
 use crate::status::AxisStatus;
 
 /// Longest request; what is longer is refused and skipped.
@@ -23,11 +26,57 @@ pub const LINE_MAX: usize = 256;
 /// Nanounits in a unit.
 const NANO: i64 = 1_000_000_000;
 
+/// A parameter of a vendor that clients can read and write.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedParameter {
+    /// Its name in the tables.
+    pub name: String,
+    /// Its number.
+    pub parameter: Parameter,
+    /// The unit of its values; empty for a bare number.
+    pub unit: &'static str,
+    /// When it may be written.
+    pub access: Access,
+    /// Least and greatest value.
+    pub range: Option<(i64, i64)>,
+}
+
+impl NamedParameter {
+    /// Those that the overlays of a gateway define, in the order of their numbers.
+    #[must_use]
+    pub fn of(mapping: &Mapping) -> Vec<Self> {
+        let rows = mapping.dictionaries.generic.parameters().iter();
+        let mut parameters: Vec<Self> = rows
+            .filter(|row| row.parameter.is_of_vendor())
+            .map(|row| Self {
+                name: row.name.clone(),
+                parameter: row.parameter,
+                unit: row.quantity.unit(),
+                access: row.access,
+                range: row.range,
+            })
+            .collect();
+        parameters.sort_by_key(|row| row.parameter);
+        parameters
+    }
+}
+
 /// A request of a client.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
     /// List the axes.
     Axes,
+    /// List the parameters.
+    Parameters,
+    /// Read or write a parameter.
+    Parameter {
+        /// Position of the axis in the configuration, from 0.
+        axis: usize,
+        /// Position of the parameter in the list.
+        parameter: usize,
+        /// What is written; `None` reads.
+        wanted: Option<i64>,
+    },
     /// Show the state of an axis.
     Status {
         /// Position of the axis in the configuration, from 0.
@@ -46,7 +95,9 @@ pub enum Request {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BadRequest {
     /// The first word is none of the protocol's.
-    #[error("unknown word `{0}`: expected axes, status, enable, disable, stop, reset, jog, move or home")]
+    #[error(
+        "unknown word `{0}`: expected axes, status, enable, disable, stop, reset, jog, move, home, parameters, read or write"
+    )]
     Word(String),
     /// The word needs an axis.
     #[error("`{0}` needs the name of an axis")]
@@ -59,6 +110,15 @@ pub enum BadRequest {
         /// The names of all axes.
         known: String,
     },
+    /// There is no parameter of this name.
+    #[error("unknown parameter `{name}`: `parameters` lists those of the overlays")]
+    Parameter {
+        /// The name in the request.
+        name: String,
+    },
+    /// The text is not a whole number.
+    #[error("`{0}` is not a whole number of 64 bits")]
+    Whole(String),
     /// A value is missing.
     #[error("`{word}` needs {what}")]
     Missing {
@@ -102,21 +162,25 @@ impl BadRequest {
     pub const fn code(&self) -> &'static str {
         match self {
             Self::Axis { .. } | Self::NoAxis(_) => "no-axis",
+            Self::Parameter { .. } => "no-parameter",
             Self::TooMany => "busy",
             _ => "syntax",
         }
     }
 }
 
-/// Reads a line. `axes` are the names of the axes in the order of the configuration.
+/// Reads a line. `axes` are the names of the axes in the order of the configuration, `parameters` those that clients can access.
 ///
 /// # Errors
 /// [`BadRequest`]; nothing is done then.
-pub fn parse(line: &str, axes: &[String]) -> Result<Request, BadRequest> {
+pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Result<Request, BadRequest> {
     let mut words = line.split_ascii_whitespace();
     let word = words.next().unwrap_or_default();
     let request = match word {
         "axes" => Request::Axes,
+        "parameters" => Request::Parameters,
+        "read" => access("read", &mut words, axes, parameters)?,
+        "write" => access("write", &mut words, axes, parameters)?,
         "status" => Request::Status { axis: axis("status", &mut words, axes)? },
         _ => {
             let word = ["enable", "disable", "stop", "reset", "jog", "move", "home"]
@@ -131,6 +195,24 @@ pub fn parse(line: &str, axes: &[String]) -> Result<Request, BadRequest> {
         None => Ok(request),
         Some(text) => Err(BadRequest::Unexpected { text: text.to_owned(), expected: "the end of the line" }),
     }
+}
+
+fn access<'a>(
+    word: &'static str,
+    words: &mut impl Iterator<Item = &'a str>,
+    axes: &[String],
+    parameters: &[NamedParameter],
+) -> Result<Request, BadRequest> {
+    let axis = axis(word, words, axes)?;
+    let name = words.next().ok_or(BadRequest::Missing { word, what: "the name of a parameter" })?;
+    let parameter = parameters.iter().position(|known| known.name == name);
+    let parameter = parameter.ok_or_else(|| BadRequest::Parameter { name: name.to_owned() })?;
+    if word == "read" {
+        return Ok(Request::Parameter { axis, parameter, wanted: None });
+    }
+    let text = words.next().ok_or(BadRequest::Missing { word, what: "a value" })?;
+    let wanted = text.parse().map_err(|_| BadRequest::Whole(text.to_owned()))?;
+    Ok(Request::Parameter { axis, parameter, wanted: Some(wanted) })
 }
 
 fn axis<'a>(
@@ -283,6 +365,32 @@ pub fn list(names: &[String], state: impl Fn(usize) -> String) -> String {
     text
 }
 
+/// The reply to `parameters`: a line for each, and one that ends the list.
+#[must_use]
+pub fn parameter_list(parameters: &[NamedParameter]) -> String {
+    let mut text = String::new();
+    for NamedParameter { name, unit, access, range, .. } in parameters {
+        let _ = write!(text, "parameter {name} access={access}");
+        if !unit.is_empty() {
+            let _ = write!(text, " unit={unit}");
+        }
+        if let Some((low, high)) = range {
+            let _ = write!(text, " min={low} max={high}");
+        }
+        text.push('\n');
+    }
+    let _ = writeln!(text, "ok parameters {}", parameters.len());
+    text
+}
+
+/// The reply to an access to a parameter that has succeeded.
+#[must_use]
+pub fn accessed(word: &str, axis: &str, parameter: &NamedParameter, value: i64) -> String {
+    let NamedParameter { name, unit, .. } = parameter;
+    let unit = if unit.is_empty() { String::new() } else { format!(" unit={unit}") };
+    format!("ok {word} {axis} {name}={value}{unit}\n")
+}
+
 /// The reply to an order that has completed, with the state of the axis.
 #[must_use]
 pub fn done(order: &str, axis: &str, state: &str) -> String {
@@ -316,8 +424,26 @@ mod tests {
         ["x", "y-2"].map(str::to_owned).to_vec()
     }
 
+    fn parameters() -> Vec<NamedParameter> {
+        let notch = NamedParameter {
+            name: "notch_frequency".to_owned(),
+            parameter: Parameter(0x8001),
+            unit: "mHz",
+            access: Access::Write,
+            range: Some((50_000, 2_000_000)),
+        };
+        let code = NamedParameter {
+            name: "code".to_owned(),
+            parameter: Parameter(0x8002),
+            unit: "",
+            access: Access::Read,
+            range: None,
+        };
+        vec![notch, code]
+    }
+
     fn order(line: &str) -> Order {
-        match parse(line, &axes()) {
+        match parse(line, &axes(), &parameters()) {
             Ok(Request::Order { order, .. }) => order,
             other => panic!("{line}: {other:?}"),
         }
@@ -326,8 +452,15 @@ mod tests {
     #[test]
     fn every_request_is_read() {
         let axes = axes();
+        let parse = |line: &str, axes: &[String]| parse(line, axes, &parameters());
         assert_eq!(parse("axes", &axes), Ok(Request::Axes));
         assert_eq!(parse("  status\ty-2 ", &axes), Ok(Request::Status { axis: 1 }));
+        assert_eq!(parse("parameters", &axes), Ok(Request::Parameters));
+        let parameter = |parameter, wanted| Ok(Request::Parameter { axis: 1, parameter, wanted });
+        assert_eq!(parse("read y-2 code", &axes), parameter(1, None));
+        assert_eq!(parse("write y-2 notch_frequency -5", &axes), parameter(0, Some(-5)));
+        let most = format!("write y-2 notch_frequency {}", i64::MIN);
+        assert_eq!(parse(&most, &axes), parameter(0, Some(i64::MIN)));
         for (line, expected) in [
             ("enable x", Order::Enable),
             ("disable x", Order::Disable),
@@ -384,11 +517,30 @@ mod tests {
             "move x 1 velocity=1 velocity=2",
             "move x 1 velocity=1 by=hand",
             "axes x",
+            "parameters x",
+            "read",
+            "read x",
+            "read x notch",
+            "read x code 1",
+            "write x code",
+            "write x code 1.5",
+            "write x notch_frequency 9223372036854775808",
+            "write x code 1 2",
         ]
         .into_iter()
-        .map(|line| bad(line, &parse(line, &axes()).expect_err(line)))
+        .map(|line| bad(line, &parse(line, &axes(), &parameters()).expect_err(line)))
         .collect();
         insta::assert_snapshot!(texts.concat());
+    }
+
+    #[test]
+    fn parameters_are_listed_and_shown_with_their_unit() {
+        let expected = "parameter notch_frequency access=write unit=mHz min=50000 max=2000000\n\
+                        parameter code access=read\nok parameters 2\n";
+        assert_eq!(parameter_list(&parameters()), expected);
+        let [notch, code] = parameters().try_into().expect("two");
+        assert_eq!(accessed("read", "x", &notch, 120_000), "ok read x notch_frequency=120000 unit=mHz\n");
+        assert_eq!(accessed("write", "x", &code, -7), "ok write x code=-7\n");
     }
 
     #[test]
@@ -422,7 +574,7 @@ mod tests {
 
         #[test]
         fn any_line_has_an_answer_of_one_line(line in "\\PC{0,80}") {
-            if let Err(error) = parse(&line, &axes()) {
+            if let Err(error) = parse(&line, &axes(), &parameters()) {
                 let reply = bad(&line, &error);
                 prop_assert_eq!(reply.matches('\n').count(), 1);
                 prop_assert!(reply.starts_with("error "));

@@ -19,7 +19,7 @@ use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::mpsc;
 use tracing::{info, warn};
 
-use super::protocol::{self, BadRequest, LINE_MAX};
+use super::protocol::{self, BadRequest, LINE_MAX, NamedParameter};
 use crate::config::AxisKind;
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
 use crate::latest::Reader;
@@ -47,6 +47,8 @@ pub struct Shared {
     pub names: Vec<String>,
     /// Rotary or linear, in the order of the axes: it decides the unit in replies.
     pub kinds: Vec<AxisKind>,
+    /// Parameters that can be read and written.
+    pub parameters: Vec<NamedParameter>,
     /// The status of the gateway.
     pub status: Reader<BoxStatus>,
 }
@@ -82,7 +84,7 @@ pub struct LocalServer {
 /// From a client's task to the hub.
 #[derive(Debug)]
 enum ToHub {
-    Order { client: ClientId, id: u32, axis: u8, order: Order },
+    Ask(Request),
     Gone { client: ClientId },
 }
 
@@ -138,7 +140,7 @@ impl LocalServer {
                     }
                 },
                 Some(message) = from_clients.recv() => waiting.push_back(match message {
-                    ToHub::Order { client, id, axis, order } => Request::Order { client, id, axis, order },
+                    ToHub::Ask(request) => request,
                     ToHub::Gone { client } => {
                         clients.remove(&client);
                         Request::Gone { client }
@@ -209,7 +211,7 @@ impl Client {
 
     async fn serve(&self, stream: &mut UnixStream, mut answers: mpsc::Receiver<Answer>) -> io::Result<()> {
         let mut lines = Lines::default();
-        let mut pending: HashMap<u32, (&'static str, usize)> = HashMap::new();
+        let mut pending: HashMap<u32, Accepted> = HashMap::new();
         let mut last = 0_u32;
         let mut buffer = [0; 512];
         loop {
@@ -224,11 +226,10 @@ impl Client {
                         let Some(line) = lines.push(*byte) else { continue };
                         last = last.wrapping_add(1);
                         match self.request(&line, pending.len()) {
-                            Ok(Accepted { axis, order }) => {
-                                pending.insert(last, (order.name(), axis));
-                                let axis = u8::try_from(axis).unwrap_or(u8::MAX);
-                                let message = ToHub::Order { client: self.id, id: last, axis, order };
-                                if self.to_hub.send(message).await.is_err() {
+                            Ok(accepted) => {
+                                let request = self.asked(last, &accepted);
+                                pending.insert(last, accepted);
+                                if self.to_hub.send(ToHub::Ask(request)).await.is_err() {
                                     return Ok(());
                                 }
                             }
@@ -242,7 +243,7 @@ impl Client {
                         return Err(unread());
                     };
                     match pending.remove(&answer.id) {
-                        Some((order, axis)) => self.reply(order, axis, &answer),
+                        Some(accepted) => self.reply(&accepted, &answer),
                         None => String::new(),
                     }
                 }
@@ -255,24 +256,47 @@ impl Client {
     /// What a line asks the engine for, or the reply to it.
     fn request(&self, line: &Result<String, BadRequest>, pending: usize) -> Result<Accepted, String> {
         let line = line.as_ref().map_err(|error| protocol::bad("-", error))?;
-        let names = &self.shared.names;
-        match protocol::parse(line, names).map_err(|error| protocol::bad(line, &error))? {
+        let Shared { names, parameters, .. } = &*self.shared;
+        match protocol::parse(line, names, parameters).map_err(|error| protocol::bad(line, &error))? {
             protocol::Request::Axes => Err(protocol::list(names, |axis| self.shared.state(axis))),
             protocol::Request::Status { axis } => {
                 Err(protocol::done("status", &names[axis], &self.shared.state(axis)))
             }
-            protocol::Request::Order { .. } if pending >= PENDING_MAX => {
+            protocol::Request::Parameters => Err(protocol::parameter_list(parameters)),
+            protocol::Request::Order { .. } | protocol::Request::Parameter { .. }
+                if pending >= PENDING_MAX =>
+            {
                 Err(protocol::bad(line, &BadRequest::TooMany))
             }
-            protocol::Request::Order { axis, order } => Ok(Accepted { axis, order }),
+            protocol::Request::Order { axis, order } => Ok(Accepted { axis, what: What::Order(order) }),
+            protocol::Request::Parameter { axis, parameter, wanted } => {
+                Ok(Accepted { axis, what: What::Parameter(parameters[parameter].clone(), wanted) })
+            }
         }
     }
 
-    fn reply(&self, order: &str, axis: usize, answer: &Answer) -> String {
-        let name = self.shared.names.get(axis).map_or("-", String::as_str);
-        match &answer.result {
-            Ok(()) => protocol::done(order, name, &self.shared.state(axis)),
-            Err(failure) => protocol::failed(order, name, failure),
+    /// What the engine is asked.
+    fn asked(&self, id: u32, Accepted { axis, what }: &Accepted) -> Request {
+        let (client, axis) = (self.id, u8::try_from(*axis).unwrap_or(u8::MAX));
+        match what {
+            What::Order(order) => Request::Order { client, id, axis, order: *order },
+            What::Parameter(named, wanted) => {
+                Request::Parameter { client, id, axis, parameter: named.parameter, wanted: *wanted }
+            }
+        }
+    }
+
+    fn reply(&self, Accepted { axis, what }: &Accepted, answer: &Answer) -> String {
+        let name = self.shared.names.get(*axis).map_or("-", String::as_str);
+        let word = match what {
+            What::Order(order) => order.name(),
+            What::Parameter(_, None) => "read",
+            What::Parameter(_, Some(_)) => "write",
+        };
+        match (&answer.result, what) {
+            (Ok(Some(value)), What::Parameter(named, _)) => protocol::accessed(word, name, named, *value),
+            (Ok(_), _) => protocol::done(word, name, &self.shared.state(*axis)),
+            (Err(failure), _) => protocol::failed(word, name, failure),
         }
     }
 }
@@ -281,10 +305,16 @@ fn unread() -> io::Error {
     io::Error::new(io::ErrorKind::TimedOut, "the client does not read its replies")
 }
 
-/// An order that goes to the engine.
+/// A request that goes to the engine.
 struct Accepted {
     axis: usize,
-    order: Order,
+    what: What,
+}
+
+/// What is asked of an axis.
+enum What {
+    Order(Order),
+    Parameter(NamedParameter, Option<i64>),
 }
 
 /// Cuts a stream of bytes into lines of bounded length.
@@ -320,10 +350,12 @@ impl Lines {
 mod tests {
     use std::os::unix::fs::MetadataExt as _;
 
+    use profile_generic::parameter::{Access, Parameter};
     use tokio::io::{AsyncBufReadExt as _, BufReader};
 
     use super::*;
     use crate::engine::local::Failure;
+    use crate::engine::parameter::ParameterFailure;
     use crate::latest::latest;
     use crate::status::tests::distinct;
 
@@ -340,7 +372,15 @@ mod tests {
         let (publisher, status) = latest(distinct());
         drop(publisher);
         let names = ["x", "y"].map(str::to_owned).to_vec();
-        Shared { names, kinds: vec![AxisKind::Rotary, AxisKind::Linear], status }
+        let code = NamedParameter {
+            name: "code".to_owned(),
+            parameter: Parameter(0x8002),
+            unit: "mHz",
+            access: Access::Write,
+            range: None,
+        };
+        let kinds = vec![AxisKind::Rotary, AxisKind::Linear];
+        Shared { names, kinds, parameters: vec![code], status }
     }
 
     fn queues() -> (ClientEnd, rtrb::Consumer<Request>, rtrb::Producer<Answer>) {
@@ -409,7 +449,7 @@ mod tests {
             panic!("not the reset");
         };
         bench.answers.push(Answer { client: number, id: second, result: Err(Failure::Controller) }).unwrap();
-        bench.answers.push(Answer { client: number, id, result: Ok(()) }).unwrap();
+        bench.answers.push(Answer { client: number, id, result: Ok(None) }).unwrap();
         assert_eq!(
             hear(&mut client).await,
             "error reset x controller: a controller is connected to the device of this axis\n"
@@ -417,6 +457,30 @@ mod tests {
         assert!(hear(&mut client).await.starts_with("ok enable y state=faulted owner=controller "));
         drop(client);
         assert_eq!(bench.request().await, Request::Gone { client: number });
+    }
+
+    #[tokio::test]
+    async fn a_parameter_is_asked_of_the_engine_and_its_value_comes_back() {
+        let mut bench = Bench::start("parameter");
+        let mut client = bench.connect().await;
+        say(&mut client, "parameters\nread y code\nwrite x code -3\nwrite x mode 1\n").await;
+        assert_eq!(hear(&mut client).await, "parameter code access=write unit=mHz\n");
+        assert_eq!(hear(&mut client).await, "ok parameters 1\n");
+        assert!(hear(&mut client).await.starts_with("error write - no-parameter: unknown parameter `mode`"));
+        let (read, write) = (bench.request().await, bench.request().await);
+        let Request::Parameter { client: number, id, axis: 1, parameter: Parameter(0x8002), wanted: None } =
+            read
+        else {
+            panic!("{read:?}");
+        };
+        let Request::Parameter { id: second, axis: 0, wanted: Some(-3), .. } = write else {
+            panic!("{write:?}");
+        };
+        bench.answers.push(Answer { client: number, id, result: Ok(Some(77)) }).unwrap();
+        let failure = Failure::Parameter(ParameterFailure::Value);
+        bench.answers.push(Answer { client: number, id: second, result: Err(failure) }).unwrap();
+        assert_eq!(hear(&mut client).await, "ok read y code=77 unit=mHz\n");
+        assert_eq!(hear(&mut client).await, "error write x value: the value is out of range\n");
     }
 
     #[tokio::test]

@@ -1,6 +1,6 @@
 //! The server: a bounded number of clients, each answered from the latest status.
 
-use std::future::{Future, Ready, ready};
+use std::future::Future;
 use std::io;
 use std::net::SocketAddr;
 use std::pin::Pin;
@@ -17,6 +17,7 @@ use tokio_modbus::server::Service;
 use tokio_modbus::server::tcp::Server;
 
 use super::map::{Refusal, registers};
+use super::parameters::Parameters;
 use crate::latest::Reader;
 use crate::status::BoxStatus;
 
@@ -41,6 +42,7 @@ pub struct ModbusServer {
     listener: TcpListener,
     clients_max: u8,
     idle: Duration,
+    parameters: Parameters,
 }
 
 impl ModbusServer {
@@ -49,7 +51,14 @@ impl ModbusServer {
     /// # Errors
     /// The address cannot be had.
     pub async fn bind(address: SocketAddr, clients_max: u8) -> io::Result<Self> {
-        Ok(Self { listener: TcpListener::bind(address).await?, clients_max, idle: IDLE })
+        let listener = TcpListener::bind(address).await?;
+        Ok(Self { listener, clients_max, idle: IDLE, parameters: Parameters::default() })
+    }
+
+    /// The same with registers that are parameters of drives.
+    #[must_use]
+    pub fn with_parameters(self, parameters: Parameters) -> Self {
+        Self { parameters, ..self }
     }
 
     /// Where it listens.
@@ -67,17 +76,17 @@ impl ModbusServer {
     pub async fn run(self, source: impl StatusSource) -> io::Result<()> {
         let places = Arc::new(Semaphore::new(usize::from(self.clients_max)));
         let source: Arc<dyn StatusSource> = Arc::new(source);
-        let idle = self.idle;
+        let (idle, parameters) = (self.idle, self.parameters);
         let on_connected = |stream: TcpStream, peer: SocketAddr| {
             let place = Arc::clone(&places).try_acquire_owned().ok();
-            let source = Arc::clone(&source);
+            let (source, parameters) = (Arc::clone(&source), parameters.clone());
             async move {
                 let Some(place) = place else {
                     tracing::warn!(%peer, "Modbus client refused: too many clients are connected");
                     return Ok(None);
                 };
                 tracing::debug!(%peer, "Modbus client connected");
-                Ok(Some((Registers { source }, Client::new(stream, place, idle))))
+                Ok(Some((Registers { source, parameters }, Client::new(stream, place, idle))))
             }
         };
         let on_error = |error: io::Error| tracing::debug!(%error, "Modbus client gone");
@@ -88,29 +97,49 @@ impl ModbusServer {
 /// Answers one client.
 struct Registers {
     source: Arc<dyn StatusSource>,
+    parameters: Parameters,
 }
 
 impl Service for Registers {
     type Request = SlaveRequest<'static>;
     type Response = Response;
     type Exception = ExceptionCode;
-    type Future = Ready<Result<Response, ExceptionCode>>;
+    type Future = Pin<Box<dyn Future<Output = Result<Response, ExceptionCode>> + Send>>;
 
     fn call(&self, request: Self::Request) -> Self::Future {
-        let read = |address, count| {
-            registers(&self.source.status(), address, count).map_err(|refusal| match refusal {
+        let (source, parameters) = (Arc::clone(&self.source), self.parameters.clone());
+        let read = async move |address, count| {
+            if parameters.has(address) {
+                return parameters.read(address, count).await;
+            }
+            registers(&source.status(), address, count).map_err(|refusal| match refusal {
                 Refusal::Address => ExceptionCode::IllegalDataAddress,
                 Refusal::Count => ExceptionCode::IllegalDataValue,
             })
         };
-        ready(match request.request {
-            Request::ReadInputRegisters(address, count) => {
-                read(address, count).map(Response::ReadInputRegisters)
+        let parameters = self.parameters.clone();
+        let write = async move |address, words: &[u16]| match parameters.has(address) {
+            true => parameters.write(address, words).await,
+            false => Err(ExceptionCode::IllegalFunction),
+        };
+        Box::pin(async move {
+            match request.request {
+                Request::ReadInputRegisters(address, count) => {
+                    read(address, count).await.map(Response::ReadInputRegisters)
+                }
+                Request::ReadHoldingRegisters(address, count) => {
+                    read(address, count).await.map(Response::ReadHoldingRegisters)
+                }
+                Request::WriteSingleRegister(address, word) => {
+                    write(address, &[word]).await.map(|()| Response::WriteSingleRegister(address, word))
+                }
+                Request::WriteMultipleRegisters(address, words) => {
+                    let count = u16::try_from(words.len()).unwrap_or(u16::MAX);
+                    let written = write(address, &words).await;
+                    written.map(|()| Response::WriteMultipleRegisters(address, count))
+                }
+                _ => Err(ExceptionCode::IllegalFunction),
             }
-            Request::ReadHoldingRegisters(address, count) => {
-                read(address, count).map(Response::ReadHoldingRegisters)
-            }
-            _ => Err(ExceptionCode::IllegalFunction),
         })
     }
 }
@@ -170,12 +199,17 @@ impl AsyncWrite for Client {
 mod tests {
     use std::net::Ipv4Addr;
 
+    use profile_generic::parameter::Parameter;
     use tokio::io::AsyncReadExt;
     use tokio_modbus::client::{Client as _, Context as Master, Reader as _, Writer as _, tcp};
     use tokio_modbus::slave::SlaveContext as _;
 
+    use super::super::parameters::Binding;
     use super::*;
+    use crate::engine::parameter::ParameterFailure;
+    use crate::engine::registers::{RegisterAnswer, RegisterEnd, RegisterRequest};
     use crate::latest::latest;
+    use crate::modbus::map::Kind;
     use crate::status::tests::distinct;
 
     /// A running server on a free port, with `clients` places.
@@ -206,6 +240,58 @@ mod tests {
         next.counters.cycles = 5;
         publisher.publish(&next);
         assert_eq!(client.read_input_registers(16, 4).await.unwrap().unwrap(), [0, 0, 0, 5]);
+    }
+
+    /// Behind the map a client reads and writes parameters of drives; what is beside them is not there.
+    #[tokio::test]
+    async fn registers_of_parameters_are_read_and_written_through_the_engine() {
+        let (requests, mut taken) = rtrb::RingBuffer::<RegisterRequest>::new(4);
+        let (mut given, answers) = rtrb::RingBuffer::new(4);
+        let binding =
+            |register, kind, write| Binding { register, kind, axis: 1, parameter: Parameter(0x8001), write };
+        let bindings = vec![binding(4_160, Kind::I32, true), binding(4_162, Kind::U16, true)];
+        let (parameters, hub) = Parameters::new(bindings, RegisterEnd { requests, answers });
+        tokio::spawn(hub.run());
+        // A drive that holds what was written last, and takes up to 1000.
+        tokio::spawn(async move {
+            let mut held = -123_456;
+            loop {
+                while let Ok(request) = taken.pop() {
+                    let result = match request.wanted {
+                        Some(wanted) if wanted > 1_000 => Err(ParameterFailure::Value.into()),
+                        Some(wanted) => {
+                            held = wanted;
+                            Ok(wanted)
+                        }
+                        None => Ok(held),
+                    };
+                    given.push(RegisterAnswer { id: request.id, result }).unwrap();
+                }
+                sleep(Duration::from_millis(1)).await;
+            }
+        });
+        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let server = ModbusServer::bind(address, 2).await.unwrap().with_parameters(parameters);
+        let address = server.local_address().unwrap();
+        let (_publisher, reader) = latest(distinct());
+        tokio::spawn(server.run(reader));
+        let mut client = connect(address).await;
+        // -123456 is FFFE 1DC0.
+        assert_eq!(client.read_holding_registers(4_160, 2).await.unwrap().unwrap(), [0xFFFE, 0x1DC0]);
+        assert_eq!(client.read_input_registers(4_160, 2).await.unwrap().unwrap(), [0xFFFE, 0x1DC0]);
+        assert_eq!(client.write_multiple_registers(4_160, &[0, 700]).await.unwrap(), Ok(()));
+        assert_eq!(client.read_holding_registers(4_162, 1).await.unwrap().unwrap(), [700]);
+        assert_eq!(client.write_single_register(4_162, 900).await.unwrap(), Ok(()));
+        assert_eq!(client.read_holding_registers(4_160, 2).await.unwrap().unwrap(), [0, 900]);
+        let refused = client.write_single_register(4_162, 1_001).await.unwrap();
+        assert_eq!(refused, Err(ExceptionCode::IllegalDataValue));
+        assert_eq!(client.read_holding_registers(4_162, 1).await.unwrap().unwrap(), [900]);
+        for (register, count) in [(4_160, 3), (4_160, 1), (4_161, 1), (4_163, 1), (4_159, 2)] {
+            let refused = client.read_holding_registers(register, count).await.unwrap();
+            assert_eq!(refused, Err(ExceptionCode::IllegalDataAddress), "{register} {count}");
+        }
+        assert_eq!(client.write_single_register(0, 1).await.unwrap(), Err(ExceptionCode::IllegalFunction));
+        assert_eq!(client.read_input_registers(0, 1).await.unwrap().unwrap(), [1], "the map as before");
     }
 
     #[tokio::test]

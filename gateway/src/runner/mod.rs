@@ -35,18 +35,20 @@ use self::port::{CanSocketPort, OpenPort, PacketPort, PortError, UdpPort};
 use self::strangers::DropWatch;
 use crate::capture::can_bus::CanProtocol;
 use crate::capture::recorder::{Recorder, Settings, Tap};
-use crate::config::{AxisKind, CanLink, Config, Link};
+use crate::config::{AxisKind, CanLink, Config, Link, ModbusParameter};
 use crate::engine::Engine;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
 use crate::engine::local::LocalNorth;
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::CanPort;
+use crate::engine::registers::RegisterNorth;
 use crate::host::HostPort;
 use crate::latest::Reader;
+use crate::local::protocol::NamedParameter;
 use crate::local::{LocalServer, Shared, SocketFile};
 use crate::mapping::Mapping;
-use crate::modbus::ModbusServer;
+use crate::modbus::{Binding, ModbusServer, Parameters};
 use crate::north::{self, ExplicitServer, ServeError};
 use crate::settings::Store;
 use crate::simulate::can_bus::InProcessCan;
@@ -102,6 +104,12 @@ pub enum StartError {
         name: String,
         /// Why.
         error: profile_cip::device::config::ConfigError,
+    },
+    /// A register is bound to a parameter that no overlay defines.
+    #[error("no overlay defines the parameter `{name}` that a Modbus register is bound to")]
+    ModbusParameter {
+        /// The name.
+        name: String,
     },
     /// The Modbus TCP port is not to be had.
     #[error("cannot listen on {address} for Modbus TCP: {source}")]
@@ -289,10 +297,12 @@ pub fn start(
         info!(device = device.name, address = %server.local_address(), "EtherNet/IP");
         servers.push(north::spawn(server)?);
     }
-    if let Some(modbus) = config.modbus {
+    if let Some(modbus) = &config.modbus {
+        let parameters = modbus_parameters(&modbus.parameters, &mut engine, &runtime)?;
         let server = runtime
             .block_on(ModbusServer::bind(modbus.listen, modbus.clients_max))
-            .map_err(|source| StartError::Modbus { address: modbus.listen, source })?;
+            .map_err(|source| StartError::Modbus { address: modbus.listen, source })?
+            .with_parameters(parameters);
         info!(address = %modbus.listen, "Modbus TCP");
         let source = status.clone();
         runtime.spawn(async move {
@@ -331,6 +341,31 @@ pub fn start(
     })
 }
 
+/// The registers that are parameters of drives, served by the engine.
+fn modbus_parameters(
+    bound: &[ModbusParameter],
+    engine: &mut Engine,
+    runtime: &tokio::runtime::Runtime,
+) -> Result<Parameters, StartError> {
+    if bound.is_empty() {
+        return Ok(Parameters::default());
+    }
+    let binding = |row: &ModbusParameter| {
+        let named = engine.mapping().dictionaries.generic.parameter(&row.parameter);
+        let named = named.filter(|named| named.parameter.is_of_vendor());
+        let named = named.ok_or_else(|| StartError::ModbusParameter { name: row.parameter.clone() })?;
+        let axis = u8::try_from(row.axis).unwrap_or(u8::MAX);
+        let ModbusParameter { register, kind, write, .. } = *row;
+        Ok(Binding { register, kind, axis, parameter: named.parameter, write })
+    };
+    let bindings = bound.iter().map(binding).collect::<Result<Vec<_>, StartError>>()?;
+    let (registers, end) = RegisterNorth::new();
+    let (parameters, hub) = Parameters::new(bindings, end);
+    engine.set_registers(registers);
+    runtime.spawn(hub.run());
+    Ok(parameters)
+}
+
 /// Offers local control of all axes on a socket.
 fn serve_local(
     path: &Path,
@@ -343,6 +378,7 @@ fn serve_local(
     let shared = Shared {
         names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
         kinds: config.axes.iter().map(|axis| axis.kind).collect(),
+        parameters: NamedParameter::of(engine.mapping()),
         status: status.clone(),
     };
     let (server, file) = LocalServer::bind(path, shared, end)

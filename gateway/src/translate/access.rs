@@ -55,7 +55,12 @@ impl Translator {
                     Err(error) => error.to_string(),
                 };
                 let place = axis.south.parameter(parameter);
-                let lacks = if place.is_none() { ": the drive has no such parameter" } else { "" };
+                let is_computed = mapping.dictionaries.generic.computation(parameter).is_some();
+                let lacks = match place {
+                    _ if is_computed => ", which is computed",
+                    None => ": the drive has no such parameter",
+                    Some(_) => "",
+                };
                 let name = &mapping.parameter_name(parameter);
                 (format!("{name} {value}{lacks}"), place)
             }

@@ -7,7 +7,7 @@ use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
 
-use super::vendor;
+use super::{computed, vendor};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source};
 use crate::{
@@ -109,6 +109,7 @@ fn sercos_axis(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings)
                     |name: &str| rows().find(|row| row.parameter.get_ref() == name).map(|row| row.idn.span());
                 vendor::attributes(mapping, scaling, findings);
                 vendor::held(mapping, &program, (&file.text, "idn"), place, findings);
+                computed::ranges(mapping, scaling, (&program, "generic-sercos"), findings);
             }
         }
         Err(error) => {
@@ -152,6 +153,7 @@ fn cia402_axis(mapping: &Mapping, scaling: &CipScaling, findings: &mut Findings)
                     rows().find(|row| row.parameter.get_ref() == name).map(|row| row.object.span())
                 };
                 vendor::held(mapping, &program, (&file.text, "object"), place, findings);
+                computed::ranges(mapping, scaling, (&program, "generic-cia402"), findings);
             }
         }
         Err(error) => {

@@ -5,6 +5,7 @@
 
 mod attributes;
 pub mod axes;
+mod computed;
 pub mod diff;
 mod faults;
 mod page;
@@ -77,6 +78,7 @@ fn for_all_drives(mapping: &Mapping, walks: &mut states::Walks, findings: &mut F
     states::check(mapping, walks, findings);
     rows::check(mapping, findings);
     vendor::bindings(mapping, findings);
+    computed::bindings(mapping, findings);
     axes::sercos(mapping, findings);
     trade::check(mapping, findings);
     for_cia402(mapping, walks, findings);

@@ -136,7 +136,7 @@ fn attributes(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().cip_generic;
     for row in &file.rows.attribute {
         let Some(attribute) = mapping.dictionaries.cip.attribute(row.attribute.get_ref()) else { continue };
-        let values = row.value.into_iter().chain(row.range.into_iter().flatten().map(i64::from));
+        let values = row.value.into_iter().chain(row.range.into_iter().flatten());
         for value in values {
             let width = attribute.data_type.width().filter(|width| !width.is_float());
             if let Some(message) = fits(value, width, &attribute.name) {

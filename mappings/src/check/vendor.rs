@@ -5,6 +5,7 @@ use std::ops::Range;
 use profile_generic::quantity::Quantity;
 
 use crate::attributes::Backing;
+use crate::computed::Computation;
 use crate::dictionary::GenericParameter;
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source};
@@ -26,16 +27,29 @@ pub(super) fn bindings(mapping: &Mapping, findings: &mut Findings) {
     let of_families = mapping.families().iter().map(|family| &family.mapping);
     let cia402: Vec<_> =
         of_families.chain([mapping]).map(|known| &known.tables().generic_cia402.rows).collect();
+    let generic = &mapping.dictionaries.generic;
     for (row, name) in defined(mapping) {
         let is = |other: &Name| *other.get_ref() == row.name;
+        let is_computed = generic.computation(row.parameter).is_some();
+        let needs = |computation: &Computation| {
+            let own = computation.rows.last().is_some_and(|last| last.parameter == row.parameter);
+            let reads = computation.reads.iter().any(|read| read.parameter == row.parameter);
+            !own && (reads || computation.rows.iter().any(|known| known.parameter == row.parameter))
+        };
+        let is_operand = generic.computations().iter().any(needs);
         let attributes = &tables.cip_generic.rows.attribute;
-        let north = attributes.iter().any(|row| row.parameter.as_ref().is_some_and(is));
-        let south = tables.generic_sercos.rows.parameter.iter().any(|row| is(&row.parameter))
+        let north = is_operand || attributes.iter().any(|row| row.parameter.as_ref().is_some_and(is));
+        let south = is_computed
+            || tables.generic_sercos.rows.parameter.iter().any(|row| is(&row.parameter))
             || cia402.iter().any(|rows| rows.parameter.iter().any(|row| is(&row.parameter)));
         let expected = match (north, south) {
             (true, true) => continue,
-            (false, _) => "expected an [[attribute]] row of cip-generic with this parameter, got none",
-            (true, false) => "expected a [[parameter]] row of generic-sercos or generic-cia402, got none",
+            (false, _) => {
+                "expected an [[attribute]] row of cip-generic with this parameter, or a computed value that uses it, got none"
+            }
+            (true, false) => {
+                "expected a [[parameter]] row of generic-sercos or generic-cia402, or a [[computed]] row, got none"
+            }
         };
         let problem = Problem::new(code::ROW_MISSING, name.span()).key("name");
         findings.push(&tables.generic.text, problem.expected(expected));

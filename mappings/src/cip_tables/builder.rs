@@ -658,7 +658,7 @@ impl Builder<'_> {
         let range = match served {
             // What never changes can only be set to what it is.
             Served::Constant(value) => Some((value, value)),
-            _ => row.range.map(|[low, high]| (i64::from(low), i64::from(high))),
+            _ => row.range.map(|[low, high]| (low, high)),
         };
         self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served, range });
     }

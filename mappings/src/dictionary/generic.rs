@@ -1,17 +1,18 @@
-//! Signals and parameters of the generic model, and the parameters that overlays add to it.
+//! Signals and parameters of the generic model, the parameters that overlays add to it, and what is computed from them.
 
 use profile_generic::functional_element::FunctionalElement;
 use profile_generic::image::Signal;
 use profile_generic::parameter::{Access, Parameter, ParameterType};
 use profile_generic::quantity::Quantity;
 
+use crate::computed::Computation;
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::format::{GenericFile, Name, ParameterRow as GenericParameterRow};
 use crate::load::Parsed;
 use crate::resolver::Resolver;
 
-use super::quantity;
+use super::{computed, quantity};
 
 /// Parameters that overlays may define: the registers of a drive's maker are hundreds, and every access is by binary search.
 const VENDOR_PARAMETERS_MAX: usize = 1_024;
@@ -33,7 +34,8 @@ pub struct GenericParameter {
     pub access: Access,
     /// What it is, in a sentence; may be empty for a parameter of an overlay.
     pub description: String,
-    /// Least and greatest value that may be set, in the unit of the quantity.
+    /// Least and greatest value that may be set, or that the drive may have where it is only read, in the unit of the
+    /// quantity.
     pub range: Option<(i64, i64)>,
 }
 
@@ -44,6 +46,8 @@ pub struct GenericParameter {
 pub struct GenericDictionary {
     signals: Vec<Signal>,
     parameters: Vec<GenericParameter>,
+    /// By the numbers of the parameters.
+    computations: Vec<Computation>,
 }
 
 impl GenericDictionary {
@@ -80,6 +84,8 @@ impl GenericDictionary {
             dictionary.extend(&mut resolver, row, found);
         }
         dictionary.limit(&mut resolver, &rows.profile);
+        dictionary.computations = computed::resolve(&mut resolver, rows, &dictionary);
+        rows.parameter.iter().for_each(|row| dictionary.bounded(&mut resolver, row));
         dictionary
     }
 
@@ -109,6 +115,23 @@ impl GenericDictionary {
         }
     }
 
+    /// The range of a parameter that is only read says what a computed value can be, or can be computed from.
+    fn bounded(&self, resolver: &mut Resolver<'_>, row: &GenericParameterRow) {
+        let Some(range) = row.range.as_ref().filter(|_| row.access.get_ref() == Access::Read.name()) else {
+            return;
+        };
+        let Some(known) = self.parameter(row.name.get_ref()) else { return };
+        let counts = self.computations.iter().any(|computation| {
+            computation.reads.iter().any(|read| read.parameter == known.parameter)
+                || computation.rows.iter().any(|row| row.parameter == known.parameter)
+        });
+        if !counts && known.parameter.is_of_vendor() {
+            let message =
+                "expected no range for a parameter that is only read, and that no computed value uses";
+            resolver.error(code::CONTRADICTION, range.span(), "range", message);
+        }
+    }
+
     /// All signals.
     pub fn signals(&self) -> &[Signal] {
         &self.signals
@@ -127,6 +150,18 @@ impl GenericDictionary {
     /// The parameter with this number.
     pub fn by_number(&self, parameter: Parameter) -> Option<&GenericParameter> {
         self.parameters.iter().find(|known| known.parameter == parameter)
+    }
+
+    /// How the value of a parameter is computed; `None` for one that drives have.
+    pub fn computation(&self, parameter: Parameter) -> Option<&Computation> {
+        let of = |computation: &Computation| computation.rows.last().map(|row| row.parameter);
+        let at = self.computations.binary_search_by_key(&Some(parameter), of).ok()?;
+        self.computations.get(at)
+    }
+
+    /// Everything that is computed.
+    pub fn computations(&self) -> &[Computation] {
+        &self.computations
     }
 
     /// The names of all parameters.
@@ -173,12 +208,7 @@ fn of_catalogue(resolver: &mut Resolver<'_>, row: &GenericParameterRow) -> Optio
 
 /// A row of an overlay that defines a parameter.
 fn of_vendor(resolver: &mut Resolver<'_>, row: &GenericParameterRow) -> Option<GenericParameter> {
-    let name = row.name.get_ref();
-    let is_plain = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
-    if name.is_empty() || !name.bytes().all(is_plain) {
-        let message = format!("expected small letters, digits and _, got `{name}`");
-        resolver.error(code::UNKNOWN_NAME, row.name.span(), "name", message);
-    }
+    plain(resolver, &row.name);
     let element = match &row.element {
         None => Some(FunctionalElement::ApplicationFunction),
         Some(name) => {
@@ -191,19 +221,13 @@ fn of_vendor(resolver: &mut Resolver<'_>, row: &GenericParameterRow) -> Option<G
     let accesses = Access::ALL.iter().map(|access| access.name());
     let access = resolver.name("access", &row.access, "an access", Access::parse, accesses);
     let range = row.range.as_ref().map(|range| (range, *range.get_ref()));
-    if let Some((at, [low, high])) = range {
-        if low > high {
-            let message = format!("expected the least value first, got [{low}, {high}]");
-            resolver.error(code::OUT_OF_RANGE, at.span(), "range", message);
-        }
-        if access == Some(Access::Read) {
-            let message = "expected no range for a parameter that is only read";
-            resolver.error(code::CONTRADICTION, at.span(), "range", message);
-        }
+    if let Some((at, [low, high])) = range.filter(|(_, [low, high])| low > high) {
+        let message = format!("expected the least value first, got [{low}, {high}]");
+        resolver.error(code::OUT_OF_RANGE, at.span(), "range", message);
     }
     Some(GenericParameter {
         parameter: Parameter(*row.number.as_ref()?.get_ref()),
-        name: name.clone(),
+        name: row.name.get_ref().clone(),
         element: element?,
         quantity: quantity?,
         kind: kind?,
@@ -211,6 +235,16 @@ fn of_vendor(resolver: &mut Resolver<'_>, row: &GenericParameterRow) -> Option<G
         description: row.about.as_ref().map(|about| about.get_ref().clone()).unwrap_or_default(),
         range: range.map(|(_, [low, high])| (low, high)),
     })
+}
+
+/// Names of overlays look like those of the catalogue.
+pub(super) fn plain(resolver: &mut Resolver<'_>, row: &Name) {
+    let name = row.get_ref();
+    let is_plain = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
+    if name.is_empty() || !name.bytes().all(is_plain) {
+        let message = format!("expected small letters, digits and _, got `{name}`");
+        resolver.error(code::UNKNOWN_NAME, row.span(), "name", message);
+    }
 }
 
 /// Checks that a dictionary says what the program was built with.

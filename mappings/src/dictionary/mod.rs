@@ -9,6 +9,7 @@ mod cip_codes;
 mod cip_faults;
 mod cip_networks;
 mod cip_services;
+mod computed;
 mod documents;
 mod generic;
 mod sercos;

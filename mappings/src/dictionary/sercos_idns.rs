@@ -26,6 +26,8 @@ pub enum IdnFormat {
     Text,
     /// IDNs.
     Idn,
+    /// Floating point, of 4 or 8 bytes.
+    Float,
 }
 
 impl IdnFormat {
@@ -37,6 +39,7 @@ impl IdnFormat {
         ("hexadecimal", Self::Hexadecimal),
         ("text", Self::Text),
         ("idn", Self::Idn),
+        ("float", Self::Float),
     ];
 
     /// The word in the files.
@@ -53,6 +56,7 @@ impl IdnFormat {
             Self::Hexadecimal => Format::Hexadecimal,
             Self::Text => Format::Text,
             Self::Idn => Format::Idn,
+            Self::Float => Format::Float,
         }
     }
 }

@@ -412,6 +412,18 @@ registry! {
         "The rows of an overlay are written under the name of their table and of the list in it, as in [[generic-sercos.fault]].",
         "[[generic-sercoss.fault]]\nword = \"Class 1 diagnostic\"",
         "Correct the name.";
+    COMPUTED_RANGE = 75 Error "a computed value that does not fit":
+        "With values that the operands can have, the result is beyond the range of its parameter or of its attribute, beyond 64 bits, or divided by zero. The ranges are those of the parameters, or else all that the drive's bytes can hold. The gateway would refuse the read or the write.",
+        "[[generic.parameter]]\nnumber = 0x8001\nname = \"heat\"\nquantity = \"power\"\ntype = \"integer\"\naccess = \"read\"\nrange = [0, 1_000]\n\n[[generic.computed]]\nparameter = \"heat\"\nproduct = [\"motor_rated_current\", \"bus_voltage\"]\nsource = \"P = I U\"",
+        "Give the operands a `range`, widen that of the result, or say in `saturates` why the result may be held at the end of its range.";
+    COMPUTED_CYCLE = 76 Error "computed values that need each other":
+        "A value is computed from one that is computed from it, so neither can be known.",
+        "[[generic.parameter]]\nnumber = 0x8001\nname = \"one\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"read\"\n\n[[generic.parameter]]\nnumber = 0x8002\nname = \"other\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"read\"\n\n[[generic.computed]]\nparameter = \"one\"\nsum = [\"other\"]\nsource = \"none\"\n\n[[generic.computed]]\nparameter = \"other\"\nsum = [\"one\"]\nsource = \"none\"",
+        "Compute one of them from parameters that the drive has.";
+    NOT_INVERTIBLE = 77 Error "a computed value that cannot be set":
+        "Setting a computed value writes one operand so that the result becomes what was set. That needs one operand of your own that stands in the row once, is not computed itself, and does not select.",
+        "[[generic.parameter]]\nnumber = 0x8001\nname = \"area\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"write\"\n\n[[generic.parameter]]\nnumber = 0x8002\nname = \"side\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"write\"\n\n[[generic.computed]]\nparameter = \"area\"\nproduct = [\"side\", \"side\"]\nwrites = \"side\"\nsource = \"none\"",
+        "Name another operand in `writes`, or give the parameter `access = \"read\"`.";
 
     CONFIG_VALUE = 80 Error "a setting that cannot be used":
         "Axisbridge cannot use the value of this key of the configuration.",

@@ -426,7 +426,7 @@ pub struct CipAttributeRow {
     /// What happens when the drive has no such parameter: `shadow` or `reject`.
     pub missing: Option<Name>,
     /// Least and greatest value that may be set; others are refused.
-    pub range: Option<[i32; 2]>,
+    pub range: Option<[i64; 2]>,
     /// Where it comes from.
     pub source: Source,
     /// Worked examples.

@@ -83,6 +83,10 @@ pub(crate) fn lay<'t>(
     for (key, value) in rows {
         let known: Vec<String> = table.keys().map(|key| key.get_ref().to_string()).collect();
         let section = sections(name).iter().find(|section| section.name == *key.get_ref());
+        if section.is_some() && !table.contains_key(key.get_ref().as_ref()) {
+            // A list that no shipped row is in.
+            table.insert(key.clone(), Spanned::new(key.span(), DeValue::Array(DeArray::new())));
+        }
         match (section, table.get_mut(key.get_ref().as_ref())) {
             (Some(section), Some(list)) => merger.list(section, list, value),
             (None, Some(single)) if matches!(single.get_ref(), DeValue::Table(_)) => {

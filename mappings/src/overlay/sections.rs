@@ -43,7 +43,18 @@ const FIELDS: &[Section] =
     &[nested("fields", &["bits", "parts"], VALUES), section("patterns", &["bits", "value"])];
 const METHODS: &[Section] = &[first("methods", &["pattern"])];
 
-const GENERIC: &[Section] = &[section("signal", &["name"]), section("parameter", &["name"])];
+/// A computed value has one way in which it is computed.
+const COMPUTED: Section = Section {
+    either: &["sum", "less", "product", "ratio", "selection", "by"],
+    ..section("computed", &["parameter"])
+};
+
+const GENERIC: &[Section] = &[
+    section("signal", &["name"]),
+    section("parameter", &["name"]),
+    section("constant", &["name"]),
+    COMPUTED,
+];
 
 const CIP_ATTRIBUTES: &[Section] = &[
     section("clauses", &["source"]),

@@ -640,8 +640,7 @@ impl Compiler<'_> {
         if self.facts.is_missing(rule.at.idn) {
             return Ok(None);
         }
-        let width = self.facts.width(rule.at.idn, self.dictionary).filter(|width| !width.is_float());
-        let Some(width) = width else { return Ok(None) };
+        let Some(width) = self.facts.width(rule.at.idn, self.dictionary) else { return Ok(None) };
         let unit = if rule.at.unit_by_drive {
             let generic = fixed_unit(self.tables, self.facts, rule.at.idn, rule.quantity, None);
             generic.map(|generic| Lsb { quantity: rule.quantity, generic, zero: 0, modulo: None })
@@ -657,7 +656,9 @@ impl Compiler<'_> {
         };
         let overflow = || ScalingError::Overflow(rule.at.idn);
         let ratio = lsb.generic.then(rule.factor.inverse().ok_or_else(overflow)?).ok_or_else(overflow)?;
-        let limits = self.facts.limits(rule.at.idn, self.dictionary).unwrap_or(width.range());
+        // Minimum and maximum of a floating point number are such numbers too: the drive itself compares them.
+        let limits = self.facts.limits(rule.at.idn, self.dictionary).filter(|_| !width.is_float());
+        let limits = limits.unwrap_or(width.range());
         let outward = to_drive(rule.at.idn, ratio, lsb.zero)?.within(limits.0, limits.1);
         let inward = from_drive(rule.at.idn, ratio, lsb.zero)?;
         Ok(Some(ParameterEntry {

@@ -181,8 +181,11 @@ impl DriveFacts {
             },
             None => row.filter(|row| !row.list)?.length?,
         };
-        let float = |attribute: Attribute| attribute.format() == Format::Float;
-        if self.attribute(idn).is_some_and(float) {
+        let is_float = match self.attribute(idn) {
+            Some(attribute) => attribute.format() == Format::Float,
+            None => row.is_some_and(|row| row.format == Some(IdnFormat::Float)),
+        };
+        if is_float {
             return match length {
                 4 => Some(Width::F32),
                 8 => Some(Width::F64),

@@ -548,3 +548,91 @@ fn a_row_that_is_taken_away_is_acknowledged_at_its_own_row_only() {
     let elsewhere = "[[cip-generic.state]]\nstate = \"ready\" # accept: of another row\naxis_state = \"Stopped\"\nsource = \"own\"\n\n";
     assert_eq!(open(&format!("{elsewhere}{gone}")), 1);
 }
+
+/// What a parameter of a vendor is and takes, and how its ends hold it; more of range or access is dangerous, less is not.
+#[test]
+fn changes_of_a_vendors_parameter_are_told_and_what_widens_is_dangerous() {
+    const EXAMPLE: &str = include_str!("../../../examples/overlays/vendor-parameter.toml");
+    let mapping = |from: &str, to: &str| {
+        assert!(EXAMPLE.contains(from), "{from}");
+        let mut texts = TableTexts::embedded();
+        texts.overlays.push(Overlay::new("own.toml", &EXAMPLE.replacen(from, to, 1)));
+        (Mapping::from_texts(&texts).unwrap_or_else(|findings| panic!("{findings}")), texts)
+    };
+    let (old, _) = mapping("", "");
+    let told = |from: &str, to: &str| {
+        let (new, texts) = mapping(from, to);
+        let changes = check::diff::changes(&old, &new, &texts);
+        let [change] = changes.list.as_slice() else { panic!("{changes}") };
+        let (before, after) = (change.before.clone().unwrap(), change.after.clone().unwrap());
+        let said = format!("{} {}: {before} -> {after}", change.aspect.name(), change.row);
+        (said, change.dangerous, change.accepted.clone())
+    };
+    let row = "[[parameter]] notch_frequency";
+    let range = |to: &str| told("range = [50_000, 2_000_000]", to);
+    let said = |text: &str, dangerous| (text.to_owned(), dangerous, None);
+    let before = format!("range {row}: 50000 to 2000000");
+    assert_eq!(range("range = [49_999, 2_000_000]"), said(&format!("{before} -> 49999 to 2000000"), true));
+    assert_eq!(range("range = [50_000, 2_000_001]"), said(&format!("{before} -> 50000 to 2000001"), true));
+    assert_eq!(range("range = [50_001, 1_999_999]"), said(&format!("{before} -> 50001 to 1999999"), false));
+    assert_eq!(range(""), said(&format!("{before} -> any value"), true));
+    let (_, dangerous, accepted) = range("range = [1_000, 2_000_000] # accept: seen on the machine");
+    assert_eq!((dangerous, accepted.as_deref()), (true, Some("seen on the machine")));
+    let running = "running = true\nneed = \"------\"\nunit";
+    let stopped = "running = false\nneed = \"------\"\nunit";
+    let attribute = "[[attribute]] Notch Frequency";
+    let less = format!("access {attribute}: set, in Running too -> set");
+    assert_eq!(told(running, stopped), said(&less, false));
+    assert_eq!(
+        told("\"REAL\"\naccess", "\"LREAL\"\naccess"),
+        said(&format!("type {attribute}: REAL -> LREAL"), true)
+    );
+    assert_eq!(
+        told("decimals = 1", "decimals = 0"),
+        said("type [[idn]] P-0-0702: unsigned, 2 bytes, 1 decimals -> unsigned, 2 bytes, 0 decimals", true)
+    );
+    assert_eq!(told("type = \"u16\"", "type = \"u32\""), said("type [[object]] 2051:00: u16 -> u32", true));
+    assert_eq!(
+        told("value = 3", "value = 4"),
+        said("binding [[attribute]] Notch Filters: constant 3 -> constant 4", true)
+    );
+    // The way back: what is allowed again is more.
+    let wider = |from: &str, to: &str| {
+        let ((old, _), (new, texts)) = (mapping(from, to), mapping("", ""));
+        check::diff::changes(&old, &new, &texts).list
+    };
+    let [more] = wider(running, stopped).try_into().unwrap();
+    assert_eq!((more.aspect.name(), more.dangerous), ("access", true));
+}
+
+#[test]
+fn changes_of_computed_values_are_told() {
+    const EXAMPLE: &str = include_str!("../../../examples/overlays/computed.toml");
+    let mapping = |from: &str, to: &str| {
+        assert!(EXAMPLE.contains(from), "{from}");
+        let mut texts = TableTexts::embedded();
+        texts.overlays.push(Overlay::new("own.toml", &EXAMPLE.replacen(from, to, 1)));
+        (Mapping::from_texts(&texts).unwrap_or_else(|findings| panic!("{findings}")), texts)
+    };
+    let (old, _) = mapping("", "");
+    let told = |from: &str, to: &str| {
+        let (new, texts) = mapping(from, to);
+        let changes = check::diff::changes(&old, &new, &texts);
+        let [change] = changes.list.as_slice() else { panic!("{changes}") };
+        let (before, after) = (change.before.clone().unwrap(), change.after.clone().unwrap());
+        (format!("{} {}: {before} -> {after}", change.aspect.name(), change.row), change.dangerous)
+    };
+    assert_eq!(
+        told("factor = [100, 1]", "factor = [1_000, 1]"),
+        ("scale [[computed]] dc_load: dc_current over dc_current_rated, times 100/1, rounded nearest, saturates -> \
+          dc_current over dc_current_rated, times 1000/1, rounded nearest, saturates".to_owned(), true)
+    );
+    assert_eq!(
+        told("value = 40_000_000", "value = 50_000_000"),
+        ("scale [[constant]] dc_current_rated: 40000000 -> 50000000".to_owned(), true)
+    );
+    assert_eq!(
+        told("writes = \"gain_a\"", "writes = \"gain_b\""),
+        ("binding [[computed]] gain_in_force: writes gain_a -> writes gain_b".to_owned(), true)
+    );
+}

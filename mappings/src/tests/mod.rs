@@ -6,6 +6,7 @@ mod cip_codes;
 mod cip_dictionary;
 mod cip_program;
 mod completeness;
+mod computed;
 mod cyclic_axis;
 mod dangerous;
 mod families;

@@ -27,7 +27,7 @@ const BY_ITSELF: [&str; 6] = ["AX0005", "AX0006", "AX0007", "AX0012", "AX0013", 
 const TIMES: [&str; 9] =
     ["min", "max", "cycle_time", "setup_cycle", "jitter", "lead", "heartbeat", "guarding", "packet_rate"];
 
-const NUMBERS: [i64; 48] = [
+const NUMBERS: [i64; 52] = [
     i64::MIN,
     -1_000_000,
     -16,
@@ -66,8 +66,12 @@ const NUMBERS: [i64; 48] = [
     1_001,
     1_023,
     1_024,
+    4_159,
+    4_160,
     9_999,
     10_000,
+    65_532,
+    65_533,
     65_535,
     65_536,
     125_000,

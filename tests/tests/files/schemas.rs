@@ -87,7 +87,7 @@ fn every_overlay_of_the_examples_is_sound_and_in_the_course() {
         assert!(course.contains(&shown), "docs/mapping.md does not show {}", file.path().display());
         checked += 1;
     }
-    assert_eq!(checked, 7);
+    assert_eq!(checked, 8);
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod can_captures;
 mod can_device;
 mod can_faults;
 mod can_modes;
+mod computed_values;
 mod devicenet;
 mod drive_profile;
 mod ending;

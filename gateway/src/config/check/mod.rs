@@ -9,7 +9,7 @@ pub(super) mod can_device;
 pub(super) mod device;
 pub(super) mod devicenet;
 mod limits;
-mod modbus;
+pub(super) mod modbus;
 mod problems;
 mod realtime;
 mod references;
@@ -44,7 +44,7 @@ pub(super) fn check(file: &File) -> Result<Config, Vec<Problem>> {
 fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
     let name = value::label(problems, "the box", &file.the_box.name);
     let log_level = log_level(problems, file);
-    let modbus = value::optional(&file.modbus, |table| modbus::check(problems, table));
+    let modbus = value::optional(&file.modbus, |table| modbus::check(problems, table, &file.axis));
     let mappings = file.mappings.as_ref();
     let paths = mappings.iter().flat_map(|table| table.dir.iter().chain(&table.overlays));
     for path in paths {

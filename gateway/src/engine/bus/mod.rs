@@ -36,6 +36,10 @@ pub enum Purpose {
         /// Whether it is a write access.
         write: bool,
     },
+    /// Local control's access to a parameter, by its ticket.
+    LocalParameter(u32),
+    /// A register's access to a parameter, by its ticket.
+    RegisterParameter(u32),
     /// A diagnostic word, to find the cause of a fault or a warning.
     Diagnosis,
     /// The diagnostic message of the drive, for people.

@@ -5,14 +5,18 @@ use profile_cip::device::attribute_worker::{AccessOperation, AttributeAccess};
 use profile_cip::device::motion_device::MotionDevice;
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::parameter::Parameter;
+use profile_generic::state::Report;
 
-use super::refusal::refusal;
+use super::refusal::{parameter_refusal, refusal};
 use super::scaling::signal_octets;
 use super::stopping_torque::{self, Comparison};
 use crate::engine::access::Access;
 use crate::engine::axis::AxisChannel;
 use crate::engine::bus::{Answer, Buses, Purpose};
-use crate::mapping::{self, AttributeEntry, AttributeTable, Backing, ParameterEntry, SequenceAttributes};
+use crate::engine::parameter::{ParameterJob, ParameterJobs};
+use crate::mapping::{
+    self, AttributeEntry, AttributeTable, Backing, Mapping, ParameterEntry, SequenceAttributes,
+};
 
 /// Writes to the drive that may be under way for one axis.
 const WRITES_MAX: usize = 8;
@@ -25,6 +29,16 @@ pub(super) struct Accesses {
     writes: ArrayVec<(u32, u16, ArrayVec<u8, 8>), WRITES_MAX>,
     /// A Stopping Torque that is being compared with the drive's torque limits.
     comparison: Option<Comparison>,
+    /// Values that are computed from what the drive has.
+    computed: ParameterJobs<Computed>,
+}
+
+/// An access to a computed value.
+#[derive(Debug, Clone, Copy)]
+struct Computed {
+    ticket: u32,
+    attribute: u16,
+    write: bool,
 }
 
 /// The axis whose attributes are accessed.
@@ -47,7 +61,7 @@ impl Accesses {
         on: &mut Accessed<'_>,
         access: &AttributeAccess,
         buses: &mut Buses,
-        sequence: &SequenceAttributes,
+        mapping: &Mapping,
     ) -> Result<(), GeneralStatus> {
         let entry = *on.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let (parameter, reject) = match entry.backing {
@@ -56,6 +70,9 @@ impl Accesses {
             _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
         };
         let program = on.axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+        if mapping.dictionaries.generic.computation(parameter).is_some() {
+            return self.compute(access, &entry, parameter);
+        }
         let Some(held) = program.parameter(parameter) else {
             if reject || program.rejects(parameter) {
                 return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
@@ -82,10 +99,60 @@ impl Accesses {
         let (ticket, attribute) = (access.ticket, access.id);
         let purpose = Purpose::Attribute { ticket, device: on.number, attribute, write };
         if !buses.access(on.axis_number, &request, purpose) {
-            return Err(GeneralStatus::RESOURCE_UNAVAILABLE);
+            let is_gone = on.axis.feedback().report == Report::Silent;
+            return Err(match is_gone {
+                true => GeneralStatus::DEVICE_STATE_CONFLICT,
+                false => GeneralStatus::RESOURCE_UNAVAILABLE,
+            });
         }
-        self.note_write(access, sequence);
+        self.note_write(access, &mapping.cip.sequence);
         Ok(())
+    }
+
+    /// Begins an access to a computed value.
+    fn compute(
+        &mut self,
+        access: &AttributeAccess,
+        entry: &AttributeEntry,
+        parameter: Parameter,
+    ) -> Result<(), GeneralStatus> {
+        let wanted = match &access.operation {
+            AccessOperation::Read(_) => None,
+            AccessOperation::Write(bytes) => {
+                Some(entry.to_generic(bytes).map_err(|_| GeneralStatus::INVALID_ATTRIBUTE_VALUE)?)
+            }
+        };
+        let what = Computed { ticket: access.ticket, attribute: access.id, write: wanted.is_some() };
+        match self.computed.push(what, ParameterJob::new(parameter, wanted)) {
+            true => Ok(()),
+            false => Err(GeneralStatus::RESOURCE_UNAVAILABLE),
+        }
+    }
+
+    /// Asks the drive for what computed values need next, and answers the controller with those that are known.
+    pub fn advance(&mut self, on: &mut Accessed<'_>, buses: &mut Buses, mapping: &Mapping) {
+        let Accessed { number, axis_number, attributes, axis, .. } = *on;
+        let device = &mut *on.device;
+        self.computed.advance(
+            |_, job| job.next(mapping, axis),
+            |what, request| {
+                let Computed { ticket, attribute, write } = *what;
+                buses.access(
+                    axis_number,
+                    request,
+                    Purpose::Attribute { ticket, device: number, attribute, write },
+                )
+            },
+            |what, result| {
+                let mut bytes = [0; 8];
+                let answer = match result.map_err(parameter_refusal) {
+                    Ok(_) if what.write => Ok(0),
+                    Ok(value) => shown(attributes.get(what.attribute), value, &mut bytes),
+                    Err(status) => Err(status),
+                };
+                device.complete_attribute(what.ticket, answer.map(|len| &bytes[..len]));
+            },
+        );
     }
 
     /// Compares a Stopping Torque with the drive's torque limits. A comparison in progress is overtaken, or its drive was lost.
@@ -139,6 +206,9 @@ impl Accesses {
                 let kept = verdict.and_then(|()| on.device.put_attribute(on.place, id, &value));
                 on.device.complete_attribute(ticket, kept.map(|()| &[][..]));
             }
+            return;
+        }
+        if self.computed.take(|what| what.ticket == ticket, answer, on.axis) {
             return;
         }
         let mut bytes = [0; 8];
@@ -204,13 +274,18 @@ impl Accessed<'_> {
     fn read(&self, attribute: u16, data: &[u8], bytes: &mut [u8; 8]) -> Result<usize, GeneralStatus> {
         let entry = self.attributes.get(attribute);
         let generic = held(self.attributes, self.axis, attribute).and_then(|held| held.decode(data));
-        let (entry, generic) = entry.zip(generic).ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
-        match entry.from_generic(generic, bytes) {
-            Ok((len, false)) => Ok(len),
-            // The attribute cannot hold what the drive has.
-            Ok((_, true)) => Err(GeneralStatus::DEVICE_STATE_CONFLICT),
-            Err(_) => Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
-        }
+        shown(entry, generic.ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?, bytes)
+    }
+}
+
+/// A generic value as the attribute; its length.
+fn shown(entry: Option<&AttributeEntry>, generic: i64, bytes: &mut [u8; 8]) -> Result<usize, GeneralStatus> {
+    let entry = entry.ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+    match entry.from_generic(generic, bytes) {
+        Ok((len, false)) => Ok(len),
+        // The attribute cannot hold what the drive has.
+        Ok((_, true)) => Err(GeneralStatus::DEVICE_STATE_CONFLICT),
+        Err(_) => Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
     }
 }
 

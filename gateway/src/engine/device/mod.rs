@@ -274,11 +274,15 @@ impl DeviceChannel {
             let begun = place.ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED).and_then(|place| {
                 let member = self.members.get_mut(place).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
                 let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-                accesses.begin(&mut on, &access, buses, &mapping.cip.sequence)
+                accesses.begin(&mut on, &access, buses, mapping)
             });
             if let Err(status) = begun {
                 self.device.complete_attribute(access.ticket, Err(status));
             }
+        }
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
+            accesses.advance(&mut on, buses, mapping);
         }
     }
 

@@ -3,6 +3,7 @@
 use profile_cip::wire::status::GeneralStatus;
 
 use crate::engine::access::{AccessFailure, Refusal};
+use crate::engine::parameter::ParameterFailure;
 
 /// The status with which an access of the controller ends.
 pub(super) fn refusal(failure: AccessFailure) -> GeneralStatus {
@@ -13,5 +14,19 @@ pub(super) fn refusal(failure: AccessFailure) -> GeneralStatus {
         AccessFailure::Refused(Refusal::Other) | AccessFailure::Unanswered => {
             GeneralStatus::DEVICE_STATE_CONFLICT
         }
+    }
+}
+
+/// The status with which an access to a computed value ends.
+pub(super) fn parameter_refusal(failure: ParameterFailure) -> GeneralStatus {
+    match failure {
+        ParameterFailure::Absent => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
+        ParameterFailure::ReadOnly => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
+        ParameterFailure::Value => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
+        ParameterFailure::NoValue(_)
+        | ParameterFailure::Refused
+        | ParameterFailure::Torque
+        | ParameterFailure::Unanswered => GeneralStatus::DEVICE_STATE_CONFLICT,
+        ParameterFailure::Busy => GeneralStatus::RESOURCE_UNAVAILABLE,
     }
 }

@@ -20,12 +20,16 @@ pub use self::order::{Answer, ClientId, Failure, Generator, Jog, Move, Order, Re
 pub use self::profile::MotionProfile;
 
 use profile_generic::inhibit::Inhibits;
+use profile_generic::parameter::Parameter;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use self::axis::LocalAxis;
 use super::axis::AxisChannel;
+use super::bus::{self, Buses, Purpose};
 use super::north::{Exchange, North};
 use super::notice::Notice;
+use super::parameter::{Next, ParameterFailure, ParameterJob, ParameterJobs};
+use crate::mapping::Mapping;
 
 /// How long an axis moves after a jog order. A client that hangs, or a key that is released, stops the axis.
 pub const JOG_TIME: DurationNs = DurationNs::from_millis(500);
@@ -54,6 +58,20 @@ pub struct LocalNorth {
     requests: rtrb::Consumer<Request>,
     answers: rtrb::Producer<Answer>,
     axes: Box<[LocalAxis]>,
+    /// Accesses to parameters under way.
+    parameters: ParameterJobs<Accessed>,
+    /// The ticket of the last of them.
+    ticket: u32,
+}
+
+/// An access to a parameter, and who waits for it.
+#[derive(Debug, Clone, Copy)]
+struct Accessed {
+    client: ClientId,
+    id: u32,
+    axis: usize,
+    ticket: u32,
+    write: bool,
 }
 
 impl LocalNorth {
@@ -63,7 +81,9 @@ impl LocalNorth {
         let (requests, taken) = rtrb::RingBuffer::new(QUEUE_LEN);
         let (given, answers) = rtrb::RingBuffer::new(QUEUE_LEN);
         let axes = (0..axes).map(|_| LocalAxis::new()).collect();
-        (Self { requests: taken, answers: given, axes }, ClientEnd { requests, answers })
+        let (parameters, ticket) = (ParameterJobs::default(), 0);
+        let local = Self { requests: taken, answers: given, axes, parameters, ticket };
+        (local, ClientEnd { requests, answers })
     }
 
     /// Whether a client controls this axis.
@@ -91,7 +111,7 @@ impl LocalNorth {
             None => match (order, axis.fault()) {
                 (Order::Enable | Order::Reset, None) | (Order::Reset, Some(_)) => None,
                 (Order::Stop | Order::Disable, _) if !axis.may_have_torque() => {
-                    return self.answer(Answer { client, id, result: Ok(()) });
+                    return self.answer(Answer { client, id, result: Ok(None) });
                 }
                 (_, Some(fault)) => Some(Failure::Fault(fault.cause)),
                 // It may still have torque: it stops because a controller has disconnected.
@@ -134,8 +154,64 @@ impl LocalNorth {
             notice(owner_changed(number, false));
         }
         if let Some((task, result)) = ended {
+            let result = result.map(|()| None);
             self.answer(Answer { client: task.client, id: task.id, result });
         }
+    }
+
+    /// Begins an access to a parameter, or answers it if it is refused. Reading disturbs nobody; what is written is up to who
+    /// controls the axis.
+    fn access(
+        &mut self,
+        ending: bool,
+        axis: &AxisChannel,
+        (client, id, number): (ClientId, u32, usize),
+        (parameter, wanted): (Parameter, Option<i64>),
+    ) {
+        let holder = self.axes.get(number).and_then(|local| local.holder);
+        let refusal = match holder {
+            _ if ending => Some(Failure::Ending),
+            _ if wanted.is_none() => None,
+            _ if axis.has_controller() => Some(Failure::Controller),
+            Some(holder) if holder != client => Some(Failure::Held),
+            _ => None,
+        };
+        self.ticket = self.ticket.wrapping_add(1);
+        let what = Accessed { client, id, axis: number, ticket: self.ticket, write: wanted.is_some() };
+        let begun = refusal.map_or(Ok(()), Err).and_then(|()| {
+            let has_room = self.parameters.push(what, ParameterJob::new(parameter, wanted));
+            has_room.then_some(()).ok_or(Failure::Parameter(ParameterFailure::Busy))
+        });
+        if let Err(failure) = begun {
+            self.answer(Answer { client, id, result: Err(failure) });
+        }
+    }
+
+    /// Asks drives for what accesses to parameters need next, and answers those that are over.
+    pub(super) fn parameters(&mut self, mapping: &Mapping, axes: &[AxisChannel], buses: &mut Buses) {
+        let Self { parameters, answers, .. } = self;
+        parameters.advance(
+            |what, job| match axes.get(what.axis) {
+                // What a controller has set is not written over by what was asked before.
+                Some(axis) if what.write && axis.has_controller() && !job.is_written() => {
+                    Next::Done(Err(ParameterFailure::Refused))
+                }
+                Some(axis) => job.next(mapping, axis),
+                None => Next::Done(Err(ParameterFailure::Unanswered)),
+            },
+            |what, request| buses.access(what.axis, request, Purpose::LocalParameter(what.ticket)),
+            |what, result| {
+                let Accessed { client, id, .. } = what;
+                let result = result.map(Some).map_err(Failure::Parameter);
+                // The queue is full only if the server does not read it.
+                let _ = answers.push(Answer { client, id, result });
+            },
+        );
+    }
+
+    /// Takes the drive's answer to an access to a parameter.
+    pub(super) fn parameter_answered(&mut self, ticket: u32, answer: &bus::Answer, axis: &AxisChannel) {
+        self.parameters.take(|what| what.ticket == ticket, answer, axis);
     }
 
     /// The client that controls the axis has disconnected.
@@ -195,6 +271,15 @@ impl North for LocalNorth {
                     let number = usize::from(axis);
                     match axes.get_mut(number) {
                         Some(axis) => self.order(now, ending, (number, axis), (client, id, order), notice),
+                        None => self.answer(Answer { client, id, result: Err(Failure::NoAxis) }),
+                    }
+                }
+                Request::Parameter { client, id, axis, parameter, wanted } => {
+                    let number = usize::from(axis);
+                    match axes.get(number) {
+                        Some(axis) => {
+                            self.access(ending, axis, (client, id, number), (parameter, wanted));
+                        }
                         None => self.answer(Answer { client, id, result: Err(Failure::NoAxis) }),
                     }
                 }

@@ -4,10 +4,12 @@ use std::fmt;
 
 use profile_generic::fault::FaultCause;
 use profile_generic::mode::ModeSelection;
+use profile_generic::parameter::Parameter;
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::state::DriveState;
 
 use crate::engine::axis::Awaited;
+use crate::engine::parameter::ParameterFailure;
 
 /// A connection to local control. Numbers are not used again while the gateway runs, and start at 1.
 pub type ClientId = u32;
@@ -92,6 +94,19 @@ pub enum Request {
         /// What is to be done.
         order: Order,
     },
+    /// An access to a parameter of a drive.
+    Parameter {
+        /// Who has sent it; the answer goes there.
+        client: ClientId,
+        /// Returned in the [`Answer`].
+        id: u32,
+        /// Position of the axis in the configuration, from 0.
+        axis: u8,
+        /// The parameter.
+        parameter: Parameter,
+        /// What is written, in the unit of the parameter's quantity; `None` reads.
+        wanted: Option<i64>,
+    },
     /// The client has disconnected: its axes stop and lose their torque.
     Gone {
         /// Who has sent it; the answer goes there.
@@ -106,8 +121,8 @@ pub struct Answer {
     pub client: ClientId,
     /// The number of the order.
     pub id: u32,
-    /// `Ok` once the effect was measured.
-    pub result: Result<(), Failure>,
+    /// `Ok` once the effect was measured; with the value of a parameter, in the unit of its quantity.
+    pub result: Result<Option<i64>, Failure>,
 }
 
 /// Why an order was refused or not completed.
@@ -153,6 +168,8 @@ pub enum Failure {
     Replaced(&'static str),
     /// A controller connected; the axis stops.
     Taken,
+    /// A parameter was not read or written.
+    Parameter(ParameterFailure),
 }
 
 impl Failure {
@@ -181,6 +198,16 @@ impl Failure {
             Self::OffTarget(_) => "off-target",
             Self::Replaced(_) => "replaced",
             Self::Taken => "taken",
+            Self::Parameter(failure) => match failure {
+                ParameterFailure::Absent => "absent",
+                ParameterFailure::ReadOnly => "read-only",
+                ParameterFailure::Value => "value",
+                ParameterFailure::Torque => "torque",
+                ParameterFailure::NoValue(_) => "no-value",
+                ParameterFailure::Refused => "refused",
+                ParameterFailure::Unanswered => "unanswered",
+                ParameterFailure::Busy => "busy",
+            },
         }
     }
 }
@@ -214,6 +241,7 @@ impl fmt::Display for Failure {
             Self::OffTarget(place) => write!(f, "the axis stands at {place}, not at its target"),
             Self::Replaced(by) => write!(f, "replaced by `{by}`"),
             Self::Taken => f.write_str("a controller connected: the axis stops"),
+            Self::Parameter(failure) => failure.fmt(f),
         }
     }
 }

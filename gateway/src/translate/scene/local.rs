@@ -56,7 +56,7 @@ impl Orders {
                     duration::parse(time).map(Step::Wait).ok_or_else(|| duration::EXPECTED.to_owned())
                 }
                 None if content == "leave" => Ok(Step::Leave),
-                None => match protocol::parse(content, &axes) {
+                None => match protocol::parse(content, &axes, &[]) {
                     Ok(protocol::Request::Order { axis, order }) => Ok(Step::Order { axis, order }),
                     Ok(_) => Err("expected an order, `wait TIME` or `leave`".to_owned()),
                     Err(BadRequest::Word(word)) => {
@@ -104,7 +104,7 @@ impl Client {
         while let Ok(Answer { id, result, .. }) = self.end.answers.pop() {
             self.awaited.take_if(|awaited| *awaited == id);
             match result {
-                Ok(()) => say("local: done"),
+                Ok(_) => say("local: done"),
                 Err(failure) => say(&format!("local: {}: {failure}", failure.code())),
             }
         }

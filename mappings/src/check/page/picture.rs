@@ -15,6 +15,7 @@ use super::super::axes::obedient;
 use super::diagram::{Diagram, Side};
 use super::{escaped, name};
 use crate::attributes::{AttributeTable, Backing};
+use crate::check::diff::computation;
 use crate::dictionary::IdnUnit;
 use crate::finding::Source;
 use crate::format::{FieldValueRow, Name, listed};
@@ -257,8 +258,14 @@ impl<'m> Joined<'m> {
         let file = &tables.generic_cia402;
         let rows = file.rows.parameter.iter().filter(|row| row.parameter.get_ref() == name);
         let cia402 = rows.map(|row| self.south(&file.text, &row.object, quantity, of_cia402.as_slice()));
-        let (about, unit) = (if parameter.is_of_vendor() { "vendor" } else { "" }, quantity.unit());
-        let mut generic = Self::generic(name, about, quantity);
+        let computed = tables.generic.rows.computed.iter().find(|row| row.parameter.get_ref() == name);
+        let about = match computed {
+            Some(row) => format!("computed, {}", computation(row)),
+            None if parameter.is_of_vendor() => "vendor".to_owned(),
+            None => String::new(),
+        };
+        let unit = quantity.unit();
+        let mut generic = Self::generic(name, &about, quantity);
         if let (Some((low, high)), Some(cell)) = (row.range, generic.first_mut()) {
             let range = format!("{low} to {high} {unit}");
             cell.about = [cell.about.as_str(), range.trim_end()].join(", ");

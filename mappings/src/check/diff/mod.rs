@@ -1,8 +1,11 @@
-//! What tables say differently from others, by meaning: signs, scales, what is bound to what, states, modes, faults, and what
-//! happens where a drive lacks something.
+//! What tables say differently from others, by meaning: signs, scales, what is bound to what, states, modes, faults, what
+//! happens where a drive lacks something, and what parameters of vendors are and take.
 //!
-//! A change that can move an axis differently is dangerous. `# accept: reason` next to its row acknowledges it. Only rows of the
-//! mapping tables are compared, row by row: neither dictionaries nor the order of rows.
+//! A change that can move an axis differently is dangerous. `# accept: reason` next to its row acknowledges it. Rows of the
+//! mapping tables are compared, row by row, not their order. Of the dictionaries only what a parameter of a vendor has there is
+//! compared: its own row, its attribute, its IDN and its object.
+
+mod vendor;
 
 use std::fmt;
 use std::ops::Range;
@@ -13,6 +16,8 @@ use serde_json::{Value, json};
 use crate::finding::{Source, Spanned};
 use crate::format::{FieldValueRow, Name, RatioRow, UnitRow, listed};
 use crate::{Mapping, TableTexts};
+
+pub(super) use vendor::computation;
 
 /// What a change is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +36,14 @@ pub enum Aspect {
     Fault,
     /// What happens where a drive lacks a value.
     Missing,
+    /// The values that a parameter takes.
+    Range,
+    /// When a parameter may be written.
+    Access,
+    /// What a parameter measures.
+    Unit,
+    /// How a value is held at one of its ends.
+    Type,
 }
 
 impl Aspect {
@@ -45,6 +58,10 @@ impl Aspect {
             Self::Mode => "mode",
             Self::Fault => "fault",
             Self::Missing => "missing",
+            Self::Range => "range",
+            Self::Access => "access",
+            Self::Unit => "unit",
+            Self::Type => "type",
         }
     }
 }
@@ -60,6 +77,8 @@ struct Fact<'m> {
     aspect: Aspect,
     says: String,
     number: Option<f64>,
+    /// What it allows, from the least to the most: values, or how much access.
+    reach: Option<(i64, i64)>,
     span: Range<usize>,
 }
 
@@ -98,7 +117,7 @@ impl fmt::Display for Change {
         writeln!(f, "{mark:9} {:8} {} {}", self.aspect.name(), self.table, self.row)?;
         write!(f, "          {} -> {}", word(&self.before), word(&self.after))?;
         if let Some(factor) = self.factor {
-            write!(f, " ({} times)", super::axes::short(factor))?;
+            write!(f, " ({} times)", crate::check::axes::short(factor))?;
         }
         write!(f, "\n          {file}:{line}")?;
         match &self.accepted {
@@ -211,6 +230,11 @@ fn change(at: &Fact<'_>, before: Option<&Fact<'_>>, after: Option<&Fact<'_>>) ->
     // What a drive lacks is only dangerous where an axis would now go without it.
     let dangerous = match at.aspect {
         Aspect::Missing => before.is_some_and(|fact| fact.says == "refuse"),
+        // To allow less harms nobody, and a parameter that is gone is told by what was bound to it.
+        Aspect::Range | Aspect::Access => {
+            let reaches = before.and_then(|fact| fact.reach).zip(after.and_then(|fact| fact.reach));
+            reaches.is_some_and(|(before, after)| after.0 < before.0 || after.1 > before.1)
+        }
         _ => before.is_some(),
     };
     Change {
@@ -263,7 +287,8 @@ impl<'m> Reader<'m> {
         span: Range<usize>,
     ) -> &mut Fact<'m> {
         let (source, table, id) = (self.source, self.table, id.to_owned());
-        let fact = Fact { source, table, list, id, aspect, says: says.into(), number: None, span };
+        let fact =
+            Fact { source, table, list, id, aspect, says: says.into(), number: None, reach: None, span };
         let place = self.facts.len();
         self.facts.push(fact);
         &mut self.facts[place]
@@ -272,6 +297,13 @@ impl<'m> Reader<'m> {
     /// What a single word says.
     fn named(&mut self, row: (&'static str, &str), aspect: Aspect, name: &Name) {
         self.say(row, aspect, name.get_ref(), name.span());
+    }
+
+    /// Least and greatest value that may be set.
+    fn range(&mut self, row: (&'static str, &str), range: Option<[i64; 2]>, span: Range<usize>) {
+        let says = range.map_or_else(|| "any value".to_owned(), |[low, high]| format!("{low} to {high}"));
+        let [low, high] = range.unwrap_or([i64::MIN, i64::MAX]);
+        self.say(row, Aspect::Range, says, span).reach = Some((low, high));
     }
 
     fn scale(
@@ -318,6 +350,7 @@ fn flag(name: &str, value: Option<bool>) -> String {
 
 fn facts(mapping: &Mapping) -> Vec<Fact<'_>> {
     let mut facts = cip(mapping);
+    facts.extend(vendor::facts(mapping));
     facts.extend(sercos(mapping));
     facts.extend(cia402(mapping));
     facts
@@ -386,6 +419,7 @@ fn cip(mapping: &Mapping) -> Vec<Fact<'_>> {
         if let Some(missing) = &row.missing {
             reader.named(id, Aspect::Missing, missing);
         }
+        reader.range(id, row.range, row.attribute.span());
     }
     reader.facts
 }

@@ -1,0 +1,303 @@
+//! Accesses to one parameter of a drive in generic units, from the request to the result.
+//!
+//! A parameter that the drive has takes one access to the drive. One that is computed takes a read for each operand that counts,
+//! one after the other, and a write for the operand that is written when it is set. Nothing is kept: every value is the drive's at
+//! that moment.
+
+use arrayvec::ArrayVec;
+use profile_generic::parameter::{Access as When, Parameter};
+use profile_generic::state::Report;
+
+use super::access::{Access, AccessFailure, Refusal};
+use super::axis::AxisChannel;
+use super::bus::Answer;
+use crate::mapping::{Computation, Known, Mapping, NoValue, READS_MAX};
+
+/// Accesses under way at the same time, of one axis by a controller or of all axes by another north side.
+pub const JOBS_MAX: usize = 4;
+
+/// Why an access to a parameter failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ParameterFailure {
+    /// The drive does not have it.
+    #[error("the drive does not have this parameter")]
+    Absent,
+    /// It can only be read.
+    #[error("the parameter can only be read")]
+    ReadOnly,
+    /// The value is beyond the range, or the drive does not take it.
+    #[error("the value is out of range")]
+    Value,
+    /// It is not to be written while the drive has torque.
+    #[error("the parameter cannot be written while the drive has torque")]
+    Torque,
+    /// The values of the drive give no result.
+    #[error("{0}")]
+    NoValue(NoValue),
+    /// The drive refused for another reason, mostly that it is not the time for it.
+    #[error("the drive refused the access")]
+    Refused,
+    /// The drive is not there, or did not answer.
+    #[error("the drive does not answer")]
+    Unanswered,
+    /// Too many accesses wait.
+    #[error("too many accesses wait for the drive")]
+    Busy,
+}
+
+impl From<AccessFailure> for ParameterFailure {
+    fn from(failure: AccessFailure) -> Self {
+        match failure {
+            AccessFailure::Refused(Refusal::Unknown) => Self::Absent,
+            AccessFailure::Refused(Refusal::ReadOnly) => Self::ReadOnly,
+            AccessFailure::Refused(Refusal::Value) => Self::Value,
+            AccessFailure::Refused(Refusal::Other) => Self::Refused,
+            AccessFailure::Unanswered => Self::Unanswered,
+        }
+    }
+}
+
+/// What the drive was asked last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    /// Nothing, or its answer was taken.
+    Nothing,
+    /// The operand in this place, which is this parameter.
+    Operand(usize, Parameter),
+    /// The parameter itself.
+    Value,
+    /// To take a value.
+    Write,
+}
+
+/// What comes next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Next {
+    /// The drive is asked this; [`ParameterJob::sent`] says that it was.
+    Ask(Access),
+    /// The drive was asked.
+    Wait,
+    /// It is over: the value that was read, or written.
+    Done(Result<i64, ParameterFailure>),
+}
+
+/// An access to one parameter.
+#[derive(Debug, Clone)]
+pub struct ParameterJob {
+    parameter: Parameter,
+    /// What is written; `None` reads.
+    wanted: Option<i64>,
+    known: Known,
+    next: Asked,
+    asked: Asked,
+    result: Option<Result<i64, ParameterFailure>>,
+}
+
+impl ParameterJob {
+    /// Reads a parameter, or writes a value to it.
+    #[must_use]
+    pub const fn new(parameter: Parameter, wanted: Option<i64>) -> Self {
+        let (known, next, asked) = ([None; READS_MAX], Asked::Nothing, Asked::Nothing);
+        Self { parameter, wanted, known, next, asked, result: None }
+    }
+
+    /// What comes next.
+    pub fn next(&mut self, mapping: &Mapping, axis: &AxisChannel) -> Next {
+        if let Some(result) = self.result {
+            return Next::Done(result);
+        }
+        if self.asked != Asked::Nothing {
+            return Next::Wait;
+        }
+        let is_gone = axis.feedback().report == Report::Silent;
+        let refused = self.refused(mapping, axis);
+        if let Some(failure) = refused.or(is_gone.then_some(ParameterFailure::Unanswered)) {
+            self.fail(failure);
+            return Next::Done(Err(failure));
+        }
+        let request = match mapping.dictionaries.generic.computation(self.parameter) {
+            Some(computation) => self.compute(computation, axis),
+            None => match self.wanted {
+                Some(wanted) => self.write(self.parameter, wanted, axis),
+                None => self.read(self.parameter, Asked::Value, axis),
+            },
+        };
+        match request {
+            Ok(Some(access)) => Next::Ask(access),
+            Ok(None) => Next::Wait,
+            Err(result) => {
+                self.result = Some(result);
+                Next::Done(result)
+            }
+        }
+    }
+
+    /// Why the value is not written, by what the tables say of the parameter.
+    fn refused(&self, mapping: &Mapping, axis: &AxisChannel) -> Option<ParameterFailure> {
+        let wanted = self.wanted?;
+        let row = mapping.dictionaries.generic.by_number(self.parameter)?;
+        match row.access {
+            When::Read => Some(ParameterFailure::ReadOnly),
+            When::WriteWhileDisabled if axis.may_have_torque() => Some(ParameterFailure::Torque),
+            When::Write | When::WriteWhileDisabled => {
+                let beyond = row.range.is_some_and(|(low, high)| !(low..=high).contains(&wanted));
+                beyond.then_some(ParameterFailure::Value)
+            }
+        }
+    }
+
+    /// Whether a value may have reached the drive.
+    #[must_use]
+    pub fn is_written(&self) -> bool {
+        self.asked == Asked::Write || self.result.is_some()
+    }
+
+    /// The next step of a computed value; the error is the result.
+    fn compute(
+        &mut self,
+        computation: &Computation,
+        axis: &AxisChannel,
+    ) -> Result<Option<Access>, Result<i64, ParameterFailure>> {
+        let (missing, is_write) = match self.wanted {
+            None => match computation.value(&self.known) {
+                Ok(value) => return Err(Ok(value)),
+                Err(missing) => (missing, false),
+            },
+            Some(wanted) => match computation.solve(wanted, &self.known) {
+                Ok((parameter, value)) => return self.write(parameter, value, axis),
+                Err(missing) => (missing, true),
+            },
+        };
+        match missing {
+            NoValue::Needs(place) => {
+                let read = computation.reads.get(place).ok_or(Err(ParameterFailure::Absent))?;
+                self.read(read.parameter, Asked::Operand(place, read.parameter), axis)
+            }
+            NoValue::ReadOnly => Err(Err(ParameterFailure::ReadOnly)),
+            NoValue::Beyond | NoValue::Divisor if is_write => Err(Err(ParameterFailure::Value)),
+            other => Err(Err(ParameterFailure::NoValue(other))),
+        }
+    }
+
+    fn read(
+        &mut self,
+        parameter: Parameter,
+        next: Asked,
+        axis: &AxisChannel,
+    ) -> Result<Option<Access>, Result<i64, ParameterFailure>> {
+        let program = axis.south().ok_or(Err(ParameterFailure::Unanswered))?;
+        let held = program.parameter(parameter).filter(|held| held.from_drive.is_some());
+        let held = held.ok_or(Err(ParameterFailure::Absent))?;
+        self.next = next;
+        Ok(Some(Access::read(held.item)))
+    }
+
+    fn write(
+        &mut self,
+        parameter: Parameter,
+        value: i64,
+        axis: &AxisChannel,
+    ) -> Result<Option<Access>, Result<i64, ParameterFailure>> {
+        let program = axis.south().ok_or(Err(ParameterFailure::Unanswered))?;
+        let held = program.parameter(parameter).ok_or(Err(ParameterFailure::Absent))?;
+        let (bytes, len, clamped) = held.encode(value).ok_or(Err(ParameterFailure::ReadOnly))?;
+        if clamped {
+            return Err(Err(ParameterFailure::Value));
+        }
+        self.next = Asked::Write;
+        Ok(Access::write(held.item, &bytes[..len]))
+    }
+
+    /// The drive was asked what came next.
+    pub fn sent(&mut self) {
+        self.asked = std::mem::replace(&mut self.next, Asked::Nothing);
+    }
+
+    /// It ends so, whatever the drive says.
+    pub fn fail(&mut self, failure: ParameterFailure) {
+        self.result = Some(Err(failure));
+    }
+
+    /// Takes the drive's answer.
+    pub fn take(&mut self, answer: &Answer, axis: &AxisChannel) {
+        let asked = std::mem::replace(&mut self.asked, Asked::Nothing);
+        let data = match &answer.result {
+            Ok((data, _)) => data,
+            Err(failure) => return self.fail((*failure).into()),
+        };
+        let parameter = match asked {
+            Asked::Nothing => return,
+            Asked::Write => {
+                self.result = self.wanted.map(Ok);
+                return;
+            }
+            Asked::Operand(_, parameter) => parameter,
+            Asked::Value => self.parameter,
+        };
+        let held = axis.south().and_then(|program| program.parameter(parameter));
+        let Some(value) = held.and_then(|held| held.decode(data)) else {
+            return self.fail(ParameterFailure::Unanswered);
+        };
+        match asked {
+            Asked::Operand(place, _) => {
+                if let Some(known) = self.known.get_mut(place) {
+                    *known = Some(value);
+                }
+            }
+            _ => self.result = Some(Ok(value)),
+        }
+    }
+}
+
+/// Accesses under way, each with what it is for.
+#[derive(Debug)]
+pub struct ParameterJobs<T>(ArrayVec<(T, ParameterJob), JOBS_MAX>);
+
+impl<T> Default for ParameterJobs<T> {
+    fn default() -> Self {
+        Self(ArrayVec::new())
+    }
+}
+
+impl<T> ParameterJobs<T> {
+    /// Adds an access; `false` if there is no room.
+    pub fn push(&mut self, what: T, job: ParameterJob) -> bool {
+        self.0.try_push((what, job)).is_ok()
+    }
+
+    /// Takes the drive's answer to the access that this is true of; whether there is one.
+    pub fn take(&mut self, is: impl Fn(&T) -> bool, answer: &Answer, axis: &AxisChannel) -> bool {
+        let job = self.0.iter_mut().find(|(what, _)| is(what));
+        job.map(|(_, job)| job.take(answer, axis)).is_some()
+    }
+
+    /// Asks drives what comes next, and takes out what is over.
+    pub fn advance(
+        &mut self,
+        mut next: impl FnMut(&T, &mut ParameterJob) -> Next,
+        mut ask: impl FnMut(&T, &Access) -> bool,
+        mut done: impl FnMut(T, Result<i64, ParameterFailure>),
+    ) {
+        let mut at = 0;
+        while let Some((what, job)) = self.0.get_mut(at) {
+            let over = match next(what, job) {
+                Next::Wait => None,
+                Next::Done(result) => Some(result),
+                Next::Ask(access) => match ask(what, &access) {
+                    true => {
+                        job.sent();
+                        None
+                    }
+                    false => Some(Err(ParameterFailure::Busy)),
+                },
+            };
+            match over {
+                None => at += 1,
+                Some(result) => {
+                    let (what, _) = self.0.remove(at);
+                    done(what, result);
+                }
+            }
+        }
+    }
+}
