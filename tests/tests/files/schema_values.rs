@@ -24,8 +24,19 @@ const DOCUMENTS: [&str; 3] = [
 const BY_ITSELF: [&str; 6] = ["AX0005", "AX0006", "AX0007", "AX0012", "AX0013", "AX0080"];
 
 /// Keys that are times.
-const TIMES: [&str; 9] =
-    ["min", "max", "cycle_time", "setup_cycle", "jitter", "lead", "heartbeat", "guarding", "packet_rate"];
+const TIMES: [&str; 11] = [
+    "min",
+    "max",
+    "cycle_time",
+    "setup_cycle",
+    "jitter",
+    "threshold",
+    "asymmetry",
+    "lead",
+    "heartbeat",
+    "guarding",
+    "packet_rate",
+];
 
 const NUMBERS: [i64; 52] = [
     i64::MIN,
