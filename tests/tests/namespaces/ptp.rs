@@ -118,7 +118,7 @@ fn the_box_follows_a_foreign_grandmaster_through_its_loss_and_a_better_one() {
     let mut the_box = Running::start("run", &mut run);
     let before = time_sync_when_up(&controller, &python);
     assert_eq!((octets(&before, 1), octets(&before, 2)), ([1], [0]), "PTP runs, and nothing is proven yet");
-    wait_for(&log, "system time: synchronized", &mut the_box);
+    wait_for_count(&log, "system time: synchronized", 1, &mut the_box);
 
     let object = synchronized(&controller, &python);
     let told = u64::from_le_bytes(octets(&object, 4)).cast_signed();
@@ -196,7 +196,7 @@ fn the_box_takes_the_time_of_ptp4l_beside_it() {
     let mut run = in_namespace(&gateway, &["run", "--config", config.to_str().expect("a path in UTF-8")]);
     run.env("NO_COLOR", "1").stderr(std::fs::File::create(&log).expect("the log can be written"));
     let mut the_box = Running::start("run", &mut run);
-    wait_for(&log, "system time: synchronized", &mut the_box);
+    wait_for_count(&log, "system time: synchronized", 1, &mut the_box);
     let object = synchronized(&controller, &python);
     let told = u64::from_le_bytes(octets(&object, 4)).cast_signed();
     let (from, to) = (object["before"].as_i64().unwrap(), object["after"].as_i64().unwrap());
@@ -274,6 +274,8 @@ fn time_sync_when_up(controller: &Namespace, python: &Path) -> Value {
     panic!("the box does not answer");
 }
 
+/// Waits until a text stands so often in the log of a box: a grandmaster takes ten seconds to become one, and the follower as long again
+/// to believe it.
 fn wait_for_count(log: &Path, text: &str, count: usize, process: &mut Running) {
     let end = std::time::Instant::now() + Duration::from_secs(60);
     loop {
