@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use profile_cip::device::config::QosConfig;
+
 use super::Check;
 use super::kernel::CLOCK;
 use crate::config::{Config, TimeSource};
@@ -44,8 +46,11 @@ pub(super) fn checks(config: Option<&Config>) -> Vec<Check> {
 /// Whether a master is followed, by the gateway or by `ptp4l`.
 fn ptp(config: &Config, name: &str) -> Check {
     let port = config.devices.first().and_then(|device| HostPort::find(device.listen));
-    let place =
-        Place { interface: port.map(|port| port.interface().to_owned()), mac: [0; 6], event_dscp: 59 };
+    let place = Place {
+        interface: port.map(|port| port.interface().to_owned()),
+        mac: [0; 6],
+        event_dscp: QosConfig::default().ptp_event,
+    };
     let service = match TimeService::start(&config.time, &place) {
         Ok((service, _)) => service,
         Err(error) => {

@@ -13,7 +13,7 @@ use crate::engine::axis::rest::Unrested;
 use crate::engine::port::{NorthPort, SouthPort};
 use crate::sys::clock;
 use crate::sys::realtime;
-use crate::time::told::TimeFeed;
+use crate::time::feed::TimeFeed;
 
 /// What the thread is asked for: to go on, to stop the axes and end, to end without waiting for them.
 const RUN: u8 = 0;

@@ -102,7 +102,7 @@ impl HostTime {
     /// at each try. Two to nine readings of clocks, no waiting.
     #[must_use]
     pub fn sample(self) -> Option<TimeSample> {
-        let Beside { at, time, .. } = beside(|| read(ClockId::Tai)).usable()?;
+        let PairedReading { at, time, .. } = paired(|| read(ClockId::Tai)).usable()?;
         Some(TimeSample { at, system: SystemTime(time), rate_ppb: 0 })
     }
 
@@ -128,7 +128,7 @@ impl HostTime {
 
 /// A reading of a clock with the monotonic time of the same instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Beside {
+pub struct PairedReading {
     /// How far the two readings of the monotonic clock around it are apart, ns.
     pub apart: u64,
     /// Their middle.
@@ -137,7 +137,7 @@ pub struct Beside {
     pub time: u64,
 }
 
-impl Beside {
+impl PairedReading {
     /// Itself, if the thread was not interrupted between the readings.
     pub(super) fn usable(self) -> Option<Self> {
         Some(self).filter(|reading| reading.apart <= APART_MAX_NS)
@@ -145,12 +145,12 @@ impl Beside {
 }
 
 /// The best of some readings of a clock beside the monotonic one.
-pub(super) fn beside(read: impl Fn() -> u64) -> Beside {
+pub(super) fn paired(read: impl Fn() -> u64) -> PairedReading {
     let once = || {
         let before = monotonic_now();
         let time = read();
         let apart = monotonic_now().0.saturating_sub(before.0);
-        Beside { apart, at: MonotonicTime(before.0 + apart / 2), time }
+        PairedReading { apart, at: MonotonicTime(before.0 + apart / 2), time }
     };
     let mut best = once();
     for _ in 1..READINGS {
@@ -167,15 +167,15 @@ pub(super) fn beside(read: impl Fn() -> u64) -> Beside {
 
 /// The host's real-time clock beside the monotonic one; `None` when the thread was interrupted at each try.
 #[must_use]
-pub fn beside_realtime() -> Option<Beside> {
-    beside(|| read(ClockId::Realtime)).usable()
+pub fn realtime_reading() -> Option<PairedReading> {
+    paired(|| read(ClockId::Realtime)).usable()
 }
 
 /// The monotonic time of a stamp of the kernel that was taken just now, to some hundred nanoseconds; `None` for one that is older
 /// than a second, as the clock may have been set since, and when the thread was interrupted at each reading.
 #[must_use]
 pub fn exactly_monotonic(stamp: KernelTime) -> Option<MonotonicTime> {
-    let Beside { at, time, .. } = beside_realtime()?;
+    let PairedReading { at, time, .. } = realtime_reading()?;
     let age = time.checked_sub(stamp.0).filter(|age| *age < NANOSECONDS_PER_SECOND)?;
     at.0.checked_sub(age).map(MonotonicTime)
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use rustix::time::{DynamicClockId, clock_gettime_dynamic};
 
-use super::clock::{Beside, beside, nanoseconds};
+use super::clock::{PairedReading, nanoseconds, paired};
 
 /// An open clock.
 #[derive(Debug)]
@@ -24,11 +24,11 @@ impl Phc {
 
     /// Its time with the monotonic time of the same instant; `None` when the thread was interrupted at each try.
     #[must_use]
-    pub fn read(&self) -> Option<Beside> {
+    pub fn read(&self) -> Option<PairedReading> {
         let read = || {
             let now = clock_gettime_dynamic(DynamicClockId::Dynamic(self.0.as_fd()));
             now.map_or(0, |now| nanoseconds(now.tv_sec, now.tv_nsec))
         };
-        beside(read).usable().filter(|reading| reading.time > 0)
+        paired(read).usable().filter(|reading| reading.time > 0)
     }
 }

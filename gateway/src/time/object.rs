@@ -3,15 +3,12 @@
 use profile_cip::device::motion_device::SyncState;
 use profile_cip::device::time_sync::{ClockInfo, MasterInfo, Measurement, PortState, PtpPort, TimeSyncState};
 
+use super::feed::line_at;
 use super::judge::SyncPhase;
+use super::ptp::{LOG_ANNOUNCE, LOG_SYNC};
 use super::status::{Master, TimeStatus};
-use super::told::line_at;
 use crate::config::TimeSource;
 use crate::sys::clock::{HostTime, TimeScale, monotonic_now};
-
-/// Intervals that a follower of CIP Sync expects, log2 s.
-const LOG_ANNOUNCE: u16 = 1;
-const LOG_SYNC: i16 = 0;
 
 /// The object as it is now.
 #[must_use]
@@ -56,8 +53,8 @@ fn follower(sync: SyncState, status: &TimeStatus) -> TimeSyncState {
         ptp: Some(PtpPort {
             state: port_state(status),
             domain: status.domain,
-            log_announce: LOG_ANNOUNCE,
-            log_sync: LOG_SYNC,
+            log_announce: u16::from(LOG_ANNOUNCE.unsigned_abs()),
+            log_sync: LOG_SYNC.into(),
             master: status.master.map(|master| master_info(&master)),
         }),
         measurement: measurement.map(|(offset_from_master, mean_path_delay)| Measurement {

@@ -8,7 +8,7 @@
 //! | `shared` | the host's clock | always: the controllers read the very same clock |
 //! | `none` | not known | never |
 //!
-//! The thread has no part in the cycle: it writes [`Told`], and a failure of it is a clock that is not synchronized.
+//! The thread has no part in the cycle: it writes [`CycleTime`], and a failure of it is a clock that is not synchronized.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -21,11 +21,11 @@ use profile_cip::device::time_sync::TimeSyncSetting;
 use tracing::{error, info, warn};
 
 use super::daemon::Daemon;
+use super::feed::{CycleTime, TimeFeed};
 use super::judge::{Reason, SyncPhase};
 use super::ptp::wire::{Control, HostWire};
 use super::ptp::{FollowerConfig, follow};
 use super::status::{Identity, TimeStatus};
-use super::told::{TimeFeed, Told};
 use crate::config::{Time, TimeSource};
 use crate::latest::{Publisher, latest};
 use crate::simulate::setup::HOST_CLOCK;
@@ -135,12 +135,12 @@ impl TimeService {
         if matches!(config.source, TimeSource::Shared | TimeSource::Host) {
             first.grandmaster = Some(HOST_CLOCK);
         }
-        let (publisher, reader) = latest(Told::of(&first));
+        let (publisher, reader) = latest(CycleTime::of(&first));
         let is_host = matches!(config.source, TimeSource::Host | TimeSource::Shared);
         let view = TimeView(Arc::new(Mutex::new(first)));
         let control = Arc::new(Control::default());
         control.domain.store(config.domain, Ordering::Relaxed);
-        let teller = Teller { publisher, view: view.clone(), said: None };
+        let reporter = Reporter { publisher, view: view.clone(), said: None };
         let thread = match config.source {
             TimeSource::Ptp => {
                 let interface = config.interface.clone().or_else(|| place.interface.clone());
@@ -148,17 +148,17 @@ impl TimeService {
                 let dscp = place.event_dscp;
                 let sockets = PtpSockets::open(&interface, dscp)?;
                 let control = Arc::clone(&control);
-                Some(spawn(move || run_follower(follower, &interface, dscp, sockets, &control, teller))?)
+                Some(spawn(move || run_follower(follower, &interface, dscp, sockets, &control, reporter))?)
             }
             TimeSource::Daemon => {
                 let interface = config.interface.as_ref().or(place.interface.as_ref());
                 let daemon = Daemon::new(&follower, &config.socket, phc(config, interface)?);
                 let control = Arc::clone(&control);
-                Some(spawn(move || watch_daemon(daemon, &control, teller))?)
+                Some(spawn(move || watch_daemon(daemon, &control, reporter))?)
             }
             TimeSource::Host => {
                 let control = Arc::clone(&control);
-                Some(spawn(move || watch_host(follower.threshold, &control, teller))?)
+                Some(spawn(move || watch_host(follower.threshold, &control, reporter))?)
             }
             TimeSource::Shared | TimeSource::None => None,
         };
@@ -199,15 +199,15 @@ fn identity(mac: [u8; 6]) -> [u8; 8] {
 }
 
 /// Tells everybody, and logs what is new.
-struct Teller {
-    publisher: Publisher<Told>,
+struct Reporter {
+    publisher: Publisher<CycleTime>,
     view: TimeView,
     said: Option<(SyncPhase, Option<[u8; 8]>, u32)>,
 }
 
-impl Teller {
-    fn tell(&mut self, status: &TimeStatus) {
-        self.publisher.publish(&Told::of(status));
+impl Reporter {
+    fn report(&mut self, status: &TimeStatus) {
+        self.publisher.publish(&CycleTime::of(status));
         *self.view.0.lock().unwrap_or_else(PoisonError::into_inner) = status.clone();
         let now = (status.phase, status.grandmaster, status.steps);
         let before = self.said.replace(now);
@@ -240,7 +240,7 @@ fn run_follower(
     dscp: u8,
     first: PtpSockets,
     control: &Arc<Control>,
-    mut teller: Teller,
+    mut reporter: Reporter,
 ) {
     let mut sockets = Some(first);
     while !control.stop.load(Ordering::Relaxed) {
@@ -250,7 +250,7 @@ fn run_follower(
             Ok(sockets) => {
                 let mut wire = HostWire { sockets, domain: config.domain, control: Arc::clone(control) };
                 let followed = catch_unwind(AssertUnwindSafe(|| {
-                    follow(&config, &mut wire, &mut |status| teller.tell(status))
+                    follow(&config, &mut wire, &mut |status| reporter.report(status))
                 }));
                 match followed {
                     // The end, or another domain.
@@ -262,7 +262,7 @@ fn run_follower(
             Err(failure) => failure.to_string(),
         };
         error!(interface, %failure, "the PTP follower has ended; it begins anew in {} s", PAUSE.as_secs());
-        teller.tell(&TimeStatus::ptp(&config));
+        reporter.report(&TimeStatus::ptp(&config));
         let end = monotonic_now().0 + u64::try_from(PAUSE.as_nanos()).unwrap_or(0);
         while monotonic_now().0 < end && !control.stop.load(Ordering::Relaxed) {
             std::thread::sleep(LOOK);
@@ -281,21 +281,21 @@ fn phc(config: &Time, interface: Option<&String>) -> Result<Option<Phc>, SourceE
 }
 
 /// Tells what `ptp4l` says.
-fn watch_daemon(mut daemon: Daemon, control: &Control, mut teller: Teller) {
+fn watch_daemon(mut daemon: Daemon, control: &Control, mut reporter: Reporter) {
     while !control.stop.load(Ordering::Relaxed) {
-        teller.tell(daemon.look(monotonic_now()));
+        reporter.report(daemon.look(monotonic_now()));
         std::thread::sleep(LOOK);
     }
 }
 
 /// Tells what the kernel says of its clock.
-fn watch_host(threshold: u64, control: &Control, mut teller: Teller) {
+fn watch_host(threshold: u64, control: &Control, mut reporter: Reporter) {
     while !control.stop.load(Ordering::Relaxed) {
-        let mut status = teller.view.read();
+        let mut status = reporter.view.read();
         let kernel = clock::kernel_clock();
         status.phase = judge_host(kernel, threshold);
         status.error_bound = kernel.map_or(u64::MAX, |kernel| kernel.error_bound);
-        teller.tell(&status);
+        reporter.report(&status);
         std::thread::sleep(LOOK);
     }
 }

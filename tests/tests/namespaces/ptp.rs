@@ -8,9 +8,9 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use axisbridge::config::{Time, TimeSource};
-use axisbridge::sys::clock::beside_realtime;
+use axisbridge::sys::clock::realtime_reading;
+use axisbridge::time::feed::line_at;
 use axisbridge::time::source::{Place, TimeService};
-use axisbridge::time::told::line_at;
 use axisbridge_tests::namespace::{Namespace, cable};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::Running;
@@ -238,7 +238,7 @@ fn follower() {
     let mut errors = Vec::new();
     for _ in 0..300 {
         std::thread::sleep(Duration::from_millis(100));
-        let (line, clock) = (service.view().read().sample, beside_realtime());
+        let (line, clock) = (service.view().read().sample, realtime_reading());
         let (Some(line), Some(clock)) = (line, clock) else { continue };
         let told = line_at(&line, clock.at).system.0;
         errors.push(told.cast_signed().wrapping_sub(clock.time.cast_signed()));

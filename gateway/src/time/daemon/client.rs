@@ -57,7 +57,7 @@ impl Client {
         picture
     }
 
-    /// Beside the daemon's socket it can be reached by a daemon with its own `/tmp`.
+    /// PairedReading the daemon's socket it can be reached by a daemon with its own `/tmp`.
     fn connect(&self) -> std::io::Result<(UnixDatagram, Own)> {
         let name = format!("axisbridge-ptp-{}", std::process::id());
         let beside = self.daemon.parent().map(|folder| folder.join(&name));

@@ -17,7 +17,7 @@ use super::judge::{Event, Judge};
 use super::line::Line;
 use super::ptp::FollowerConfig;
 use super::status::TimeStatus;
-use crate::sys::clock::{Beside, beside_realtime};
+use crate::sys::clock::{PairedReading, realtime_reading};
 use crate::sys::phc::Phc;
 
 /// States of a port (IEEE 1588-2008, table 8).
@@ -50,7 +50,7 @@ impl Daemon {
     pub fn look(&mut self, now: MonotonicTime) -> &TimeStatus {
         let reading = match &self.phc {
             Some(phc) => phc.read(),
-            None => beside_realtime(),
+            None => realtime_reading(),
         };
         if self.turn == 0 {
             let picture = self.client.ask();
@@ -127,7 +127,7 @@ impl Watch {
     }
 
     /// A reading of the clock that the daemon keeps.
-    fn read(&mut self, reading: Option<Beside>, is_phc: bool) {
+    fn read(&mut self, reading: Option<PairedReading>, is_phc: bool) {
         let Some(reading) = reading else { return };
         let master = self.status.master;
         let seconds =
@@ -226,7 +226,7 @@ mod tests {
             for quarter in 0..8_u64 {
                 let now = MonotonicTime(at(10).0 + quarter * 250_000_000);
                 let time = 1_700_000_000_000_000_000 + now.0 + quarter * 25_000;
-                watch.read(Some(Beside { apart: 100, at: now, time }), is_phc);
+                watch.read(Some(PairedReading { apart: 100, at: now, time }), is_phc);
             }
             let sample = watch.status(at(12)).sample.unwrap();
             let expected = 1_700_000_000_000_000_000 + at(12).0 + 200_000 + ahead;

@@ -51,7 +51,6 @@ const SECONDS: std::ops::Range<u64> = 2..9_000_000_000;
 
 mod kind {
     pub const SYNC: u8 = 0x0;
-    pub const DELAY_REQUEST: u8 = 0x1;
     pub const FOLLOW_UP: u8 = 0x8;
     pub const DELAY_RESPONSE: u8 = 0x9;
     pub const ANNOUNCE: u8 = 0xB;
@@ -235,7 +234,6 @@ impl Guard {
             }
             kind::ANNOUNCE => self.announce(message, sender, now)?,
             // Requests of other followers, and management, are for others.
-            kind::DELAY_REQUEST => return Err(Refusal::Kind),
             _ => return Err(Refusal::Kind),
         }
         Ok(message)
@@ -394,7 +392,7 @@ pub(super) mod tests {
             ("the most nanoseconds", edited(good(), 40, &[0x3B, 0x9A, 0xC9, 0xFF]), Ok(44)),
             ("254 steps", edited(announce(1, 128, 0), 61, &[0, 254]), Ok(64)),
             ("65535 steps", edited(announce(1, 128, 0), 61, &[0xFF, 0xFF]), Err(Refusal::Steps)),
-            ("a request of another follower", head(kind::DELAY_REQUEST, 44, 1, 5), Err(Refusal::Kind)),
+            ("a request of another follower", head(0x1, 44, 1, 5), Err(Refusal::Kind)),
             ("management", head(0xD, 54, 1, 5), Err(Refusal::Kind)),
         ];
         for (name, message, expected) in rows {

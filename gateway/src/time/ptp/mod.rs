@@ -48,10 +48,10 @@ pub struct FollowerConfig {
 }
 
 /// Announces come every two seconds (CIP Sync).
-const LOG_ANNOUNCE: i8 = 1;
+pub(super) const LOG_ANNOUNCE: i8 = 1;
 
 /// Syncs come every second (CIP Sync).
-const LOG_SYNC: i8 = 0;
+pub(super) const LOG_SYNC: i8 = 0;
 
 /// Delay requests go out every second in the mean.
 const LOG_DELAY_REQUEST: i8 = 0;
@@ -132,14 +132,14 @@ fn perform(
     Ok(sent)
 }
 
-/// Follows the best master until the wire ends. `told` gets the status after each change.
+/// Follows the best master until the wire ends. `report` gets the status after each change.
 ///
 /// # Errors
 /// What the wire says.
 pub fn follow(
     config: &FollowerConfig,
     wire: &mut impl Wire,
-    told: &mut dyn FnMut(&TimeStatus),
+    report: &mut dyn FnMut(&TimeStatus),
 ) -> io::Result<()> {
     let instance = Instance::new(
         InstanceConfig {
@@ -176,7 +176,7 @@ pub fn follow(
     let mut guard = Guard::new(config.identity, config.domain);
     let mut follower = Follower::new(config);
     let mut buffer = [0; MESSAGE_MAX];
-    told(follower.status(wire.now(), &guard));
+    report(follower.status(wire.now(), &guard));
     while !wire.is_ended() {
         let patrol = MonotonicTime(wire.now().0.saturating_add(PATROL_NS));
         let until = timers.next().map_or(patrol, |at| at.min(patrol));
@@ -225,7 +225,7 @@ pub fn follow(
             follower.forget();
         }
         if follower.pass(now) {
-            told(follower.status(now, &guard));
+            report(follower.status(now, &guard));
         }
     }
     Ok(())

@@ -198,7 +198,7 @@ type Phases = Vec<(u64, SyncPhase)>;
 fn run(mut network: Network) -> (Phases, TimeStatus) {
     let seen: RefCell<(Phases, Option<TimeStatus>)> = RefCell::default();
     let mut clock = 0;
-    let mut told = |status: &TimeStatus| {
+    let mut report = |status: &TimeStatus| {
         let mut seen = seen.borrow_mut();
         // The sample has the instant at which the status was told.
         clock = status.sample.map_or(clock, |sample| sample.at.0);
@@ -207,7 +207,7 @@ fn run(mut network: Network) -> (Phases, TimeStatus) {
         }
         seen.1 = Some(status.clone());
     };
-    follow(&CONFIG, &mut network, &mut told).unwrap();
+    follow(&CONFIG, &mut network, &mut report).unwrap();
     let (phases, last) = seen.into_inner();
     (phases, last.unwrap())
 }
@@ -242,7 +242,7 @@ fn a_clock_of_another_rate_and_phase_is_followed() {
 }
 
 #[test]
-fn an_asymmetric_path_is_half_of_its_difference_off_and_can_be_told() {
+fn an_asymmetric_path_is_half_of_its_difference_off_and_can_be_report() {
     let master = Clock { delays: (103_000, 3_000), ..MASTER };
     let (_, status) = run(Network::new(&[master], 40));
     let off = error(&status, &master);

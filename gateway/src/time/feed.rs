@@ -11,14 +11,14 @@ use crate::sys::clock::{HostTime, monotonic_now};
 
 /// What of a [`TimeStatus`] the cycle needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Told {
+pub struct CycleTime {
     /// Whether time is synchronized, and with whom. The offset is that of the time base.
     pub sync: SyncState,
     /// System time with the monotonic time of one instant, and its rate.
     pub sample: Option<TimeSample>,
 }
 
-impl Told {
+impl CycleTime {
     /// What is told of a state.
     #[must_use]
     pub fn of(status: &TimeStatus) -> Self {
@@ -36,7 +36,7 @@ const HAS_GRANDMASTER: u64 = 1;
 const SYNCHRONIZED: u64 = 2;
 const HAS_SAMPLE: u64 = 4;
 
-impl Words for Told {
+impl Words for CycleTime {
     type Array = [u64; 5];
     const EMPTY: Self::Array = [0; 5];
 
@@ -74,7 +74,7 @@ impl Words for Told {
 /// Feeds the engine with system time, cycle by cycle.
 #[derive(Debug)]
 pub struct TimeFeed {
-    reader: Reader<Told>,
+    reader: Reader<CycleTime>,
     /// System time is the host's clock; otherwise what is told.
     is_host: bool,
     last: Option<SyncState>,
@@ -83,7 +83,7 @@ pub struct TimeFeed {
 impl TimeFeed {
     /// A feed from what is told; with `is_host` the time is that of the host's clock.
     #[must_use]
-    pub const fn new(reader: Reader<Told>, is_host: bool) -> Self {
+    pub const fn new(reader: Reader<CycleTime>, is_host: bool) -> Self {
         Self { reader, is_host, last: None }
     }
 
@@ -97,15 +97,15 @@ impl TimeFeed {
 
     /// Feeds after a cycle: a sample that is a cycle old is as good.
     pub fn feed(&mut self, engine: &mut Engine) {
-        let told = self.reader.read();
-        if self.last != Some(told.sync) {
-            self.last = Some(told.sync);
-            engine.set_sync(told.sync);
+        let latest = self.reader.read();
+        if self.last != Some(latest.sync) {
+            self.last = Some(latest.sync);
+            engine.set_sync(latest.sync);
         }
         let sample = if self.is_host {
             HostTime.sample()
         } else {
-            told.sample.map(|line| line_at(&line, monotonic_now()))
+            latest.sample.map(|line| line_at(&line, monotonic_now()))
         };
         if let Some(sample) = sample {
             engine.feed_time(&sample);
@@ -131,14 +131,14 @@ mod tests {
         let sync = SyncState { grandmaster: Some([1, 2, 3, 4, 5, 6, 7, 8]), synchronized: true, offset: 0 };
         let sample = TimeSample { at: MonotonicTime(7), system: SystemTime(u64::MAX), rate_ppb: -40_000 };
         for told in [
-            Told::default(),
-            Told { sync, sample: Some(sample) },
-            Told { sync: SyncState { synchronized: false, ..sync }, sample: None },
-            Told { sync: SyncState { grandmaster: None, ..sync }, sample: Some(sample) },
+            CycleTime::default(),
+            CycleTime { sync, sample: Some(sample) },
+            CycleTime { sync: SyncState { synchronized: false, ..sync }, sample: None },
+            CycleTime { sync: SyncState { grandmaster: None, ..sync }, sample: Some(sample) },
         ] {
-            let mut words = Told::EMPTY;
+            let mut words = CycleTime::EMPTY;
             assert_eq!(told.to_words(&mut words), words.len());
-            assert_eq!(Told::from_words(&words), told);
+            assert_eq!(CycleTime::from_words(&words), told);
         }
     }
 
