@@ -27,6 +27,11 @@ impl Clock {
         self.sync
     }
 
+    /// The time base while the time of the network is proven.
+    pub fn trusted(&self) -> Option<&TimeBase> {
+        (self.is_set && self.sync.synchronized).then_some(&self.base)
+    }
+
     /// Takes a sample of system time. Returns the step, if it is one, and what the devices are told if the offset has changed.
     pub fn feed(&mut self, sample: &TimeSample) -> (Option<DurationNs>, Option<SyncState>) {
         let step = if std::mem::replace(&mut self.is_set, true) {
@@ -59,6 +64,21 @@ mod tests {
         let (step, sync) = clock.feed(&sample(40, 1_003_040));
         assert_eq!(step, Some(DurationNs::from_secs(3)));
         assert_eq!(sync.map(|sync| sync.offset), Some(1_003_000_000_000));
+    }
+
+    #[test]
+    fn time_is_trusted_once_there_is_a_sample_and_while_it_is_synchronized() {
+        let mut clock = Clock::default();
+        let synchronized = |synchronized| SyncState { synchronized, ..SyncState::default() };
+        clock.set_sync(synchronized(true));
+        assert!(clock.trusted().is_none(), "no sample");
+        clock.feed(&sample(0, 5_000));
+        assert_eq!(
+            clock.trusted().map(|base| base.system_at(MonotonicTime::ZERO)),
+            Some(SystemTime(5_000_000_000))
+        );
+        clock.set_sync(synchronized(false));
+        assert!(clock.trusted().is_none());
     }
 
     #[test]

@@ -30,6 +30,7 @@ pub mod local;
 pub mod north;
 pub mod notice;
 pub mod parameter;
+pub mod phase_lock;
 pub mod port;
 mod publication;
 pub mod registers;
@@ -52,6 +53,7 @@ use self::ending::Ending;
 use self::local::LocalNorth;
 use self::north::{Exchange, North};
 use self::notice::Notice;
+use self::phase_lock::PhaseLock;
 use self::port::{NorthPort, SouthPort};
 use self::publication::{Publication, Sources};
 use self::registers::RegisterNorth;
@@ -77,6 +79,7 @@ pub struct Engine {
     axes: Vec<AxisChannel>,
     notices: rtrb::Producer<Notice>,
     schedule: Schedule,
+    locks: [PhaseLock; BUSES_MAX],
     clock: Clock,
     changes: Changes,
     publication: Publication,
@@ -111,6 +114,7 @@ impl Engine {
         Self {
             publication: Publication::new(publisher, cycle_time, axes.len(), &devices),
             schedule: Schedule::new(cycle_time, lead),
+            locks: [PhaseLock::default(); BUSES_MAX],
             clock: Clock::default(),
             changes: Changes::new(&axes),
             ending: Ending::new(axes.len()),
@@ -269,8 +273,10 @@ impl Engine {
         let notices = &mut self.notices;
         let changed = self.changes.report(now, &self.axes, &mut |notice| push(notices, notice));
         let Self { buses, devices, axes, changes, ending, publication, .. } = self;
-        let sources = Sources { stopping: ending.has_begun, buses, devices, axes, changes };
+        let sources =
+            Sources { stopping: ending.has_begun, buses, devices, axes, changes, locks: &self.locks };
         publication.publish(now, changed, &sources);
+        self.follow_time();
         self.end_call(now)
     }
 
@@ -349,6 +355,31 @@ impl Engine {
             if let Some(at) = due[place].filter(|_| bus.next_cycle().is_some()) {
                 bus.prepare();
                 self.schedule.prepared(place, at);
+            }
+        }
+    }
+
+    /// Moves the next cycle of each bus that has begun one towards the grid of system time.
+    fn follow_time(&mut self) {
+        let Self { buses, devices, axes, schedule, locks, clock, notices, .. } = self;
+        for place in 0..buses.len() {
+            let next = buses.get(place).next_cycle();
+            if !schedule.take_sent(place) && next.is_some() {
+                continue;
+            }
+            let grid = devices.iter().find_map(|channel| channel.grid(|axis| buses.of(axis) == place));
+            let mut numbered = axes.iter().enumerate();
+            let torque = numbered.any(|(number, axis)| buses.of(number) == place && axis.may_have_torque());
+            let (bus, lock) = (buses.get_mut(place), &mut locks[place]);
+            let (span, before) = (bus.cycle_time(), lock.phase().state);
+            if let Some(grid) = grid {
+                lock.refer(grid, span);
+            }
+            let by = lock.correct(clock.trusted(), next, span, torque);
+            bus.shift_grid(by);
+            let phase = lock.phase();
+            if phase.state != before {
+                push(notices, Notice::PhaseLock { bus: buses.name(place), phase });
             }
         }
     }

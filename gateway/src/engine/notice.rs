@@ -24,6 +24,7 @@ use profile_sercos::wire::idn::Idn;
 
 use super::admission::Refused;
 use super::axis::{DiagnosticMessage, Loss, PositionJump, Trip};
+use super::bus::BusName;
 use super::bus::can::failure::{Misfit, StepFailure as ObjectFailure};
 use super::bus::can::lss::LssNotice;
 use super::bus::can::trial::Tried;
@@ -31,6 +32,7 @@ use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
 use super::device::scaling::ScalingRefusal;
+use super::phase_lock::{LockState, Phase as LockPhase};
 use crate::mapping::{Cia402Error, Difference, DriveIdentity, InterpolationPeriod, Object, SercosError};
 use crate::status::AxisWait;
 
@@ -292,6 +294,13 @@ pub enum Notice {
         /// By how much.
         step: DurationNs,
     },
+    /// The cycles of a bus follow system time in another way.
+    PhaseLock {
+        /// The bus.
+        bus: BusName,
+        /// How, and how far from it they are.
+        phase: LockPhase,
+    },
     /// The diagnostic message of a drive that has a fault or warning.
     DriveSays {
         /// Number of the axis: its place in the configuration, from 0.
@@ -344,6 +353,7 @@ impl Notice {
         match self {
             Self::Sercos(Event::Connection { .. }) => Severity::Detail,
             Self::Progress { .. }
+            | Self::PhaseLock { .. }
             | Self::State { .. }
             | Self::AxisState { .. }
             | Self::LocalControl { .. }
@@ -400,6 +410,7 @@ impl Notice {
             | Self::Retry
             | Self::Progress { .. }
             | Self::TimeStep { .. }
+            | Self::PhaseLock { .. }
             | Self::Strangers { .. }
             | Self::Node { .. } => None,
             Self::DriveMissing { axis, .. }
@@ -530,6 +541,13 @@ impl fmt::Display for Notice {
             Self::TimeStep { step } => {
                 write!(f, "system time stepped by {step}; it is reported to controllers, and no axis follows it")
             }
+            Self::PhaseLock { bus, phase } => match phase.state {
+                LockState::Free => write!(f, "{bus}: the cycles go on by the clock of the gateway, not by system time"),
+                LockState::Pulling => {
+                    write!(f, "{bus}: the cycles are {} off system time and are pulled to it", phase.error)
+                }
+                LockState::Locked => write!(f, "{bus}: the cycles are locked to system time"),
+            },
             Self::DriveSays { said, .. } => diagnostic_message(f, said),
             Self::Logged { entry, cause, .. } => logged(f, entry, *cause),
             Self::Node { device, fault, alarm } => {

@@ -9,6 +9,7 @@ use super::axis::{Awaited, AxisChannel};
 use super::bus::{Buses, South};
 use super::changes::Changes;
 use super::device::DeviceChannel;
+use super::phase_lock::{Phase, PhaseLock};
 use crate::latest::Publisher;
 use crate::mapping::CipProgram;
 use crate::status::{AxisStatus, BoxState, BoxStatus, Indicators, PHASE_NONE};
@@ -34,6 +35,7 @@ pub(super) struct Sources<'a> {
     pub devices: &'a [DeviceChannel],
     pub axes: &'a [AxisChannel],
     pub changes: &'a Changes,
+    pub locks: &'a [PhaseLock],
 }
 
 /// The facts that the state of the box depends on.
@@ -115,6 +117,7 @@ impl Publication {
     fn fill(&mut self, now: MonotonicTime, sources: &Sources<'_>) {
         let status = &mut self.status;
         status.phase = sources.buses.iter().find_map(South::phase).unwrap_or(PHASE_NONE);
+        status.phase_lock = worst(&sources.locks[..sources.buses.len().min(sources.locks.len())]);
         let counters = &mut status.counters;
         (counters.cycles, counters.lost_telegrams, counters.refused_frames) = (0, 0, 0);
         for counts in sources.buses.iter().map(South::counts) {
@@ -152,6 +155,16 @@ impl Publication {
                 }
             }
         }
+    }
+}
+
+/// The least state of all buses, and the largest phase error.
+fn worst(locks: &[PhaseLock]) -> Phase {
+    let phases = || locks.iter().map(PhaseLock::phase);
+    let error = phases().map(|phase| phase.error).max_by_key(|error| error.magnitude());
+    Phase {
+        state: phases().map(|phase| phase.state).min().unwrap_or_default(),
+        error: error.unwrap_or_default(),
     }
 }
 
@@ -196,7 +209,8 @@ mod tests {
         let mut publication = Publication::new(publisher, DurationNs::from_millis(2), 0, &[]);
         let (buses, changes) = (Buses::default(), Changes::new(&[]));
         let mut publish = |millis, changed, stopping| {
-            let sources = Sources { stopping, buses: &buses, devices: &[], axes: &[], changes: &changes };
+            let sources =
+                Sources { stopping, buses: &buses, devices: &[], axes: &[], changes: &changes, locks: &[] };
             publication.publish(at(millis), changed, &sources);
             let status = reader.read();
             (status.uptime, status.state)

@@ -42,6 +42,8 @@ struct BusTimes {
     late: DurationNs,
     /// When the last cycle began: its instant on the grid.
     sent_at: Option<MonotonicTime>,
+    /// A cycle has begun since [`Schedule::take_sent`] was called last.
+    sent: bool,
 }
 
 impl Schedule {
@@ -107,6 +109,12 @@ impl Schedule {
     /// A cycle of the bus has begun.
     pub fn sent(&mut self, place: usize, at: MonotonicTime) {
         self.buses[place].sent_at = Some(at);
+        self.buses[place].sent = true;
+    }
+
+    /// Whether a cycle of the bus has begun since the last call of this.
+    pub fn take_sent(&mut self, place: usize) -> bool {
+        std::mem::take(&mut self.buses[place].sent)
     }
 
     /// When the drives captured the values that they sent: when the telegrams passed them.

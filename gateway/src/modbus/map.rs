@@ -134,6 +134,20 @@ pub const BOX: &[Entry<BoxStatus>] = &[
     entry(36, Kind::U64, "send_failures", "frames and datagrams that could not be sent", |status| {
         status.counters.send_failures
     }),
+    entry(
+        40,
+        Kind::U16,
+        "phase_lock",
+        "cycles of the buses: 0 free of system time, 1 pulled to it, 2 locked; the least of all",
+        |status| u64::from(status.phase_lock.state.code()),
+    ),
+    entry(
+        42,
+        Kind::I32,
+        "phase_error",
+        "latest cycle after its instant of system time, in nanoseconds; the largest of all",
+        |status| status.phase_lock.error.0.cast_unsigned(),
+    ),
 ];
 
 /// The block of an axis.

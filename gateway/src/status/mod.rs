@@ -19,6 +19,7 @@ pub use self::wait::AxisWait;
 use self::wait::WAIT_WORDS;
 use crate::config::AXES_MAX;
 use crate::engine::axis::Owner;
+use crate::engine::phase_lock::{LockState, Phase};
 use crate::latest::Words;
 
 /// Owners of an axis by their number in the published form.
@@ -28,7 +29,7 @@ const OWNERS: [Owner; 3] = [Owner::Nobody, Owner::Controller, Owner::Local];
 const AXIS_WORDS: usize = 11 + WAIT_WORDS;
 
 /// Words of the box itself.
-const BOX_WORDS: usize = 9;
+const BOX_WORDS: usize = 10;
 
 const WORDS: usize = BOX_WORDS + AXES_MAX * AXIS_WORDS;
 
@@ -224,6 +225,8 @@ pub struct BoxStatus {
     pub lateness_max_ns: u32,
     /// Time since the first cycle.
     pub uptime: DurationNs,
+    /// How the buses follow system time: the least state of all, and the largest phase error.
+    pub phase_lock: Phase,
     /// Counters since the start.
     pub counters: Counters,
     /// The axes in the order of the configuration.
@@ -240,6 +243,7 @@ impl BoxStatus {
         cycle_time_ns: 0,
         lateness_max_ns: 0,
         uptime: DurationNs(0),
+        phase_lock: Phase { state: LockState::Free, error: DurationNs(0) },
         counters: Counters {
             cycles: 0,
             late_cycles: 0,
@@ -387,7 +391,16 @@ impl Words for BoxStatus {
 
     fn to_words(&self, words: &mut Self::Array) -> usize {
         let counters = &self.counters;
-        let head = [self.state.0, self.phase, self.connections, self.axis_count, 0, 0, 0, 0];
+        let head = [
+            self.state.0,
+            self.phase,
+            self.connections,
+            self.axis_count,
+            self.phase_lock.state.code(),
+            0,
+            0,
+            0,
+        ];
         let of_box = [
             u64::from_be_bytes(head),
             pair(self.cycle_time_ns, self.lateness_max_ns),
@@ -398,6 +411,7 @@ impl Words for BoxStatus {
             counters.lost_telegrams,
             counters.refused_frames,
             counters.send_failures,
+            self.phase_lock.error.0.cast_unsigned(),
         ];
         let (front, rest) = words.split_at_mut(BOX_WORDS);
         front.copy_from_slice(&of_box);
@@ -410,7 +424,7 @@ impl Words for BoxStatus {
 
     fn from_words(words: &Self::Array) -> Self {
         let (front, rest) = words.split_at(BOX_WORDS);
-        let [state, phase, connections, axis_count, ..] = front[0].to_be_bytes();
+        let [state, phase, connections, axis_count, lock, ..] = front[0].to_be_bytes();
         let (cycle_time_ns, lateness_max_ns) = split(front[1]);
         let mut axes = [AxisStatus::NONE; AXES_MAX];
         let configured = rest.as_chunks::<AXIS_WORDS>().0.iter().take(usize::from(axis_count));
@@ -425,6 +439,10 @@ impl Words for BoxStatus {
             cycle_time_ns,
             lateness_max_ns,
             uptime: DurationNs(front[2].cast_signed()),
+            phase_lock: Phase {
+                state: LockState::ALL.get(usize::from(lock)).copied().unwrap_or_default(),
+                error: DurationNs(front[9].cast_signed()),
+            },
             counters: Counters {
                 cycles: front[3],
                 late_cycles: front[4],
@@ -457,6 +475,7 @@ pub(crate) mod tests {
             cycle_time_ns: 2_000_000,
             lateness_max_ns: 123_456,
             uptime: DurationNs(987_654_321_012),
+            phase_lock: Phase { state: LockState::Locked, error: DurationNs(-789) },
             counters: Counters {
                 cycles: 0x0102_0304_0506_0708,
                 late_cycles: 11,

@@ -37,6 +37,11 @@ impl Master {
         }
     }
 
+    /// Moves the grid: the next SYNC comes by so much later, and all that follow it.
+    pub fn shift_grid(&mut self, by: DurationNs) {
+        self.next_sync = self.next_sync + by;
+    }
+
     /// Begins a SYNC period when its time has come.
     pub(super) fn cycle(&mut self, now: MonotonicTime) {
         let Some(sync) = self.config.sync.filter(|_| self.running && now >= self.next_sync) else { return };

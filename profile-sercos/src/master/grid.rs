@@ -50,6 +50,11 @@ impl Grid {
         self.skip((behind / cycle.as_nanos()).max(1), cycle)
     }
 
+    /// Moves the cycles that are not built yet.
+    pub fn shift(&mut self, by: DurationNs) {
+        self.next_cycle = self.next_cycle + by;
+    }
+
     fn skip(&mut self, cycles: i64, cycle: DurationNs) -> u64 {
         self.next_cycle = self.next_cycle + cycle * cycles;
         cycles.unsigned_abs()

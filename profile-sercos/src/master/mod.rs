@@ -211,6 +211,14 @@ impl Master {
         (self.run.state() == State::Cp4).then_some(self.grid.next_cycle)
     }
 
+    /// Moves the grid, in CP4 alone: the next cycle that is not built yet begins by so much later. Slaves follow a grid that moves
+    /// by a small part of the cycle at a time; a jump would lose them the MST.
+    pub fn shift_grid(&mut self, by: DurationNs) {
+        if self.run.state() == State::Cp4 {
+            self.grid.shift(by);
+        }
+    }
+
     /// Builds the frames of the next cycle ahead of its instant; [`Master::poll`] gives them when that has come. To be called
     /// when everything of the cycle before has come back and all values are committed. Outside of CP4 nothing is built ahead.
     pub fn prepare(&mut self) {

@@ -44,6 +44,7 @@ use axisbridge::simulate::devicenet_drive::DevicenetNode;
 use axisbridge::simulate::drives::{DriveNetwork, drives};
 use axisbridge::simulate::setup;
 use axisbridge::status::{BoxState, BoxStatus};
+use profile_cia402::wire::cob_id;
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{
     Controller, ControllerConfig, DATAGRAM_MAX, Event, Report, Step, StreamAction,
@@ -204,6 +205,8 @@ pub struct Rig {
     pub reports_steps: bool,
     /// The clock of the gateway.
     pub gateway_clock: Clock,
+    /// Whether the gateway's source of system time knows its rate, as a follower of PTP does.
+    pub knows_rate: bool,
     /// How late the engine runs.
     pub wake_ups: WakeUps,
     /// Whether the stream of the controller still carries bytes.
@@ -276,6 +279,7 @@ impl Rig {
             controller_clock: Clock::default(),
             reports_steps: true,
             gateway_clock: Clock::default(),
+            knows_rate: false,
             wake_ups: WakeUps::new(settings.seed),
             stream_works: true,
             command_port: IO_PORT,
@@ -659,6 +663,13 @@ impl Rig {
         result
     }
 
+    /// When the last cycle of the first bus began, as its frames were sent: the MST, SYNC, or the first poll.
+    #[must_use]
+    pub fn cycle_sent_at(&self) -> Option<MonotonicTime> {
+        let can = self.can.first().and_then(|wire| wire.sent_at(cob_id::SYNC));
+        if self.config.sercos.is_some() { self.south.sent_at } else { can }
+    }
+
     // ---- the drives -----------------------------------------------------------------------------
 
     /// A drive, by its place in the line.
@@ -748,7 +759,8 @@ impl Rig {
     fn before_cycle(&mut self) {
         self.late = self.now.since(self.engine_due);
         let format = self.config.devices[0].connection_format;
-        let sample = TimeSample { at: self.now, system: self.system(), rate_ppb: 0 };
+        let rate_ppb = if self.knows_rate { self.gateway_clock.drift_ppb() } else { 0 };
+        let sample = TimeSample { at: self.now, system: self.system(), rate_ppb };
         self.engine.feed_time(&sample);
         for datagram in self.north.inbound.iter() {
             if let Some(update) = updates::read(datagram.as_slice(), format, None) {

@@ -161,6 +161,8 @@ pub struct SouthQueue {
     pub inbound: Ring<()>,
     /// What the master has sent.
     pub outbound: Ring<()>,
+    /// When it has begun to send last: that of the MST.
+    pub sent_at: Option<MonotonicTime>,
 }
 
 impl SouthQueue {
@@ -199,7 +201,8 @@ impl EthernetPort for SouthQueue {
         self.inbound.pop_into(buffer).map(|(len, ())| (Port::One, len))
     }
 
-    fn send(&mut self, _now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+    fn send(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+        self.sent_at = Some(now);
         port == Port::One && self.outbound.push(frame, ())
     }
 }

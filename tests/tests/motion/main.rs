@@ -7,6 +7,7 @@ mod chain;
 mod clocks;
 mod drive_faults;
 mod modes;
+mod phase_lock;
 mod round_trips;
 mod scenario;
 mod table;

@@ -10,6 +10,8 @@ pub mod devicenet;
 pub mod sercos;
 mod transmit_queue;
 
+use std::fmt;
+
 use profile_generic::state::Action;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
@@ -105,6 +107,9 @@ pub trait South {
     /// Skips cycles that would begin late by more than half of the cycle time. The grid does not move.
     fn skip_late(&mut self, now: MonotonicTime);
 
+    /// Moves the grid: the next cycle begins by so much later, and all that follow it.
+    fn shift_grid(&mut self, by: DurationNs);
+
     /// Builds the frames of the next cycle, as far as the bus can do that before its instant.
     fn prepare(&mut self);
 
@@ -175,6 +180,27 @@ pub enum AnyBus {
     Can(Box<can::CanBus>),
     /// DeviceNet.
     Devicenet(Box<devicenet::DevicenetBus>),
+}
+
+/// What people call a bus: a number of its own for each kind that a box can have several of, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BusName {
+    /// The SERCOS bus.
+    Sercos,
+    /// A CANopen bus.
+    Can(u8),
+    /// A DeviceNet network.
+    Devicenet(u8),
+}
+
+impl fmt::Display for BusName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sercos => f.write_str("SERCOS"),
+            Self::Can(number) => write!(f, "CAN bus {number}"),
+            Self::Devicenet(number) => write!(f, "DeviceNet {number}"),
+        }
+    }
 }
 
 impl AnyBus {
@@ -255,6 +281,19 @@ impl Buses {
     /// The same.
     pub fn get_mut(&mut self, place: usize) -> &mut dyn South {
         self.list[place].get_mut()
+    }
+
+    /// What people call the bus in a place.
+    #[must_use]
+    pub fn name(&self, place: usize) -> BusName {
+        let kind = std::mem::discriminant(&self.list[place]);
+        let alike = self.list[..=place].iter().filter(|bus| std::mem::discriminant(*bus) == kind).count();
+        let number = u8::try_from(alike).unwrap_or(u8::MAX);
+        match self.list[place] {
+            AnyBus::Sercos(_) => BusName::Sercos,
+            AnyBus::Can(_) => BusName::Can(number),
+            AnyBus::Devicenet(_) => BusName::Devicenet(number),
+        }
     }
 
     /// All of them, in order.

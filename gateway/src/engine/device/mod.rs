@@ -18,7 +18,7 @@ use profile_cip::device::visualization::{self, Indication, NetworkCondition};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
 use profile_cip::wire::motion::codes::{NodeAlarm, NodeFault};
 use profile_cip::wire::status::GeneralStatus;
-use profile_generic::time::{MonotonicTime, SystemTime};
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeBase;
 
 pub use self::axis::CipAxis;
@@ -30,6 +30,7 @@ use super::axis::AxisChannel;
 use super::bus::{Answer, Buses, Purpose};
 use super::north::{Exchange, North};
 use super::notice::Notice;
+use super::phase_lock::Grid;
 use super::port::{FRAME_MAX, NorthPort};
 use crate::mapping::{CipProgram, Mapping};
 use crate::north::DeviceEnd;
@@ -180,6 +181,16 @@ impl DeviceChannel {
             connected: self.device.connection().is_some() || self.link.explicit_connections() > 0,
             timed_out: self.device.is_connection_lost(),
         })
+    }
+
+    /// The grid of the controller's updates in system time, if it and an axis for which `is_meant` holds work synchronously.
+    #[must_use]
+    pub fn grid(&self, is_meant: impl Fn(usize) -> bool) -> Option<Grid> {
+        if !self.members.iter().any(|member| is_meant(member.axis)) {
+            return None;
+        }
+        let (instant, period) = self.device.update_grid()?;
+        Some(Grid { instant, period: DurationNs(i64::try_from(period).ok()?) })
     }
 
     /// Sets on each axis of the device whether a controller is connected.

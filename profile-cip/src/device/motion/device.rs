@@ -224,6 +224,16 @@ impl MotionDevice {
         self.engine.connection.as_ref().is_some_and(|c| c.schedule.mode == Mode::Synchronous)
     }
 
+    /// An instant of the controller's updates in system time, as its time stamps have it, and its update period in ns; `None`
+    /// while it does not work synchronously.
+    #[must_use]
+    pub fn update_grid(&self) -> Option<(SystemTime, u64)> {
+        let connection = self.engine.connection.as_ref()?;
+        let synchronous = connection.schedule.mode == Mode::Synchronous;
+        let stamp = connection.stamped_at.filter(|_| synchronous)?;
+        Some((SystemTime(stamp), connection.period()))
+    }
+
     /// The attributes of a scope in the order of their IDs.
     pub fn attributes(&self, scope: Scope) -> impl Iterator<Item = &AttributeDefinition> {
         self.engine.instances.table(scope).iter()

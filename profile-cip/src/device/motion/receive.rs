@@ -289,6 +289,7 @@ impl Engine {
             }
         }
         connection.schedule.align(cycle.saturating_sub(processing), now);
+        connection.stamped_at = Some(time_stamp);
         Verdict::Fresh(UpdateTimes { time_stamp: Some(time_stamp), period, paced_at })
     }
 

@@ -19,6 +19,11 @@ impl Master {
         }
     }
 
+    /// Moves the grid: the next cycle begins by so much later, and all that follow it.
+    pub fn shift_grid(&mut self, by: DurationNs) {
+        self.next_cycle = self.next_cycle + by;
+    }
+
     /// Leaves out the cycles up to `now`.
     fn skip_until(&mut self, now: MonotonicTime) {
         let cycle = self.config.cycle.as_nanos().max(1);

@@ -311,7 +311,8 @@ impl MotionChecker {
     /// Looks at what the drives have, and judges it.
     pub(super) fn observe(&mut self, rig: &Rig) {
         let apart = (rig.controller_clock.drift_ppb() - rig.gateway_clock.drift_ppb()).abs();
-        let drift = f64_from_i64(apart) / 1e9;
+        let pull = self.axes.iter().map(|axis| axis.grid.pull()).fold(0.0, f64::max);
+        let drift = pull.max(f64_from_i64(apart) / 1e9);
         if drift >= self.drifted.1 || rig.now().since(self.drifted.0) > DRIFT_LASTS {
             self.drifted = (rig.now(), drift);
         }
@@ -341,6 +342,7 @@ impl MotionChecker {
             let cycle = axis.grid.sent(sent, late > DurationNs::ZERO);
             let leader =
                 call.and_then(|call| call.leaders.get(axis.number)).copied().unwrap_or(Leader::Other);
+            let skew = Skew { drift: skew.drift.max(axis.grid.pull()), ..skew };
             let instant = Instant {
                 at: call.map_or(sent, |call| call.at),
                 cycle,

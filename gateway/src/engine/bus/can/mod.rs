@@ -461,6 +461,10 @@ impl South for CanBus {
         self.master.skip_late(now);
     }
 
+    fn shift_grid(&mut self, by: DurationNs) {
+        self.master.shift_grid(by);
+    }
+
     fn prepare(&mut self) {}
 
     fn is_up(&self) -> bool {

@@ -369,6 +369,10 @@ impl South for DevicenetBus {
         self.master.skip_late(now);
     }
 
+    fn shift_grid(&mut self, by: DurationNs) {
+        self.master.shift_grid(by);
+    }
+
     fn prepare(&mut self) {}
 
     fn is_up(&self) -> bool {

@@ -57,6 +57,9 @@ const FRAMES_PER_CYCLE: usize = 32;
 /// Service channel accesses of one drive that wait for an answer at the same time.
 const ACCESSES_MAX: usize = 4;
 
+/// The grid moves from cycle to cycle by at most this part of the jitter that the slaves were told of.
+const JITTER_FOR_PULL: i64 = 4;
+
 /// Where the drive of an axis is on its way.
 #[derive(Debug)]
 enum Stage {
@@ -591,6 +594,12 @@ impl South for SercosBus {
 
     fn skip_late(&mut self, now: MonotonicTime) {
         self.master.skip_late(now);
+    }
+
+    fn shift_grid(&mut self, by: DurationNs) {
+        // The slaves were told how even the MST comes; the pull is a part of that.
+        let most = i64::from(self.master.config().mst_jitter_ns) / JITTER_FOR_PULL;
+        self.master.shift_grid(DurationNs(by.0.clamp(-most, most)));
     }
 
     fn prepare(&mut self) {

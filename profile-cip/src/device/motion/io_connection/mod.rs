@@ -56,6 +56,8 @@ pub(crate) struct IoConnection {
     pub header: Option<CommandHeader>,
     /// System time at which the last C-to-D update was received, ns.
     pub received_at: u64,
+    /// Time stamp of the last update that counted synchronously, in the device's system time, ns.
+    pub stamped_at: Option<u64>,
     pub stamps: Stamps,
     pub schedule: Schedule,
 }
@@ -73,6 +75,7 @@ impl IoConnection {
             applied: false,
             header: None,
             received_at: 0,
+            stamped_at: None,
             stamps: Stamps::new(period),
             schedule: Schedule::new(period, poll_interval_ns / 2, now),
         }
