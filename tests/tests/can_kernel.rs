@@ -1,4 +1,4 @@
-//! The CAN socket and the settings of CAN interfaces, in a kernel that has CAN.
+//! The CAN socket and the settings of CAN interfaces, in a kernel that has CAN; and what else that kernel has and the host may not.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -7,13 +7,16 @@ use std::time::{Duration, Instant};
 use axisbridge::sys::can_error::BusState;
 use axisbridge::sys::can_interface::{self, ConfigureError, Settings, State};
 use axisbridge::sys::can_socket::{CanSocket, Content, Filter, OpenError, Options, Received};
+use axisbridge::sys::clock::monotonic_now;
 use axisbridge::sys::clock::realtime_now;
 use axisbridge::sys::link::{LinkError, LinkState};
+use axisbridge::sys::packet_socket::{ETHER_TYPE_SERCOS, PacketSocket};
 use axisbridge_tests::can_kernel::Kernel;
 use axisbridge_tests::peer::{can_kernel_or_skip, python_or_skip};
 use axisbridge_tests::slcan::{self, Adapters};
 use profile_generic::can::timing::BitRate;
 use profile_generic::can::{Frame, Id};
+use profile_generic::time::DurationNs;
 
 /// Whether to go on with `test`: only inside a guest.
 fn inside(test: &str, kernel: &Kernel) -> bool {
@@ -361,4 +364,76 @@ fn what_a_controller_says_of_its_bus_is_told_and_it_comes_back_after_bus_off() {
     assert_eq!(text(next(&mut a)), "181#02");
     a.send(&frame(0x201, &[3])).unwrap();
     assert_eq!(text(next(&mut b)), "201#03");
+}
+
+/// A telegram that is told from others by its last byte.
+fn telegram(last: u8) -> [u8; 60] {
+    let mut telegram = [last; 60];
+    telegram[..6].fill(0xFF);
+    telegram[6..12].copy_from_slice(&[2, 0, 0, 0, 0, 1]);
+    telegram[12..14].copy_from_slice(&ETHER_TYPE_SERCOS.to_be_bytes());
+    telegram
+}
+
+/// The telegrams that come within a time, by their last bytes, each with the kernel's stamp.
+fn telegrams(socket: &PacketSocket, within: Duration) -> Vec<(u8, u64)> {
+    let (end, mut buffer, mut come) = (Instant::now() + within, [0; 100], Vec::new());
+    while Instant::now() < end {
+        match socket.recv(&mut buffer).unwrap() {
+            Some(received) => {
+                come.push((buffer[received.len - 1], received.at.expect("the kernel stamps what comes").0));
+            }
+            None => std::thread::sleep(Duration::from_millis(1)),
+        }
+    }
+    come
+}
+
+/// The kernel's own discipline holds the telegrams of SERCOS III until their instant, whatever order they are handed over in.
+#[test]
+fn telegrams_leave_at_their_instant_where_the_interface_has_etf() {
+    let test = "telegrams_leave_at_their_instant_where_the_interface_has_etf";
+    let kernel = Kernel::new().interfaces(&[]).module("net/sched/sch_etf").module("drivers/net/veth");
+    if !inside(test, &kernel) {
+        return;
+    }
+    ip("link add south0 type veth peer name south1");
+    ip("link set south0 up");
+    ip("link set south1 up");
+    let open = |name| PacketSocket::open(name, ETHER_TYPE_SERCOS).unwrap();
+    let (plain, far) = (open("south0"), open("south1"));
+    assert!(!plain.launches(), "nobody has set a discipline");
+    plain.send(&telegram(1)).unwrap();
+    let come = telegrams(&far, Duration::from_millis(300));
+    assert_eq!(come.iter().map(|(last, _)| *last).collect::<Vec<_>>(), [1]);
+
+    // A millisecond before the instant the kernel takes the frame in hand, and sends it.
+    const DELTA: u64 = 1_000_000;
+    run("tc", &format!("qdisc replace dev south0 root etf clockid CLOCK_TAI delta {DELTA}"));
+    let near = open("south0");
+    assert!(near.launches());
+    let (now, wall) = (monotonic_now(), realtime_now().0);
+    for (last, millis) in [(2, 900), (3, 300), (4, 600)] {
+        near.send_at(&telegram(last), now + DurationNs::from_millis(millis)).unwrap();
+    }
+    let come = telegrams(&far, Duration::from_millis(1_500));
+    assert_eq!(
+        come.iter().map(|(last, _)| *last).collect::<Vec<_>>(),
+        [3, 4, 2],
+        "in the order of their instants"
+    );
+    for ((_, at), millis) in come.iter().zip([300, 600, 900]) {
+        let after = at.saturating_sub(wall);
+        assert!(
+            after + DELTA >= millis * 1_000_000,
+            "{after} ns after they were handed over, and not {millis} ms"
+        );
+    }
+    // What would be late is sent nevertheless, at once.
+    near.send_at(&telegram(5), now).unwrap();
+    let come = telegrams(&far, Duration::from_millis(500));
+    assert_eq!(come.iter().map(|(last, _)| *last).collect::<Vec<_>>(), [5]);
+    // A frame without an instant is thrown away.
+    let _ = near.send(&telegram(6));
+    assert_eq!(telegrams(&far, Duration::from_millis(300)), []);
 }

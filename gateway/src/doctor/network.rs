@@ -121,8 +121,20 @@ fn sercos(root: &Path, name: &str) -> Vec<Check> {
     let facts = Wire::of(root, name);
     checks.push(wire(name, &facts));
     checks.push(stamps(name, socket.has_time_stamps(), &facts.features));
+    checks.push(sending(name, &socket));
     checks.push(own_traffic(name, &facts));
     checks
+}
+
+/// Who sends the telegrams at their instant.
+fn sending(name: &str, socket: &PacketSocket) -> Check {
+    let who = if socket.launches() {
+        "at the instant of the cycle, by the discipline etf"
+    } else {
+        "when the cycle thread wakes up; with the discipline etf on the interface, the kernel or the card holds each frame until \
+         its instant (docs/tasks/prepare-the-host.md)"
+    };
+    Check::good(AREA, format!("sending on {name}"), who)
 }
 
 /// What is known of an Ethernet interface.

@@ -260,8 +260,9 @@ impl Engine {
         self.serve_norths(now, north);
         self.fill_telegrams(now, &due);
         for (place, (bus, port)) in self.buses.iter_mut().zip(south.iter_mut()).enumerate() {
-            if let Some(at) = self.schedule.take_sendable(place, now) {
-                send(bus, port, (now, at), place, &mut self.schedule, &mut self.publication);
+            if let Some(at) = self.schedule.take_sendable(place, now, port.holds_frames()) {
+                // The bus sends as of then what a port holds until then.
+                send(bus, port, (now.max(at), at), place, &mut self.schedule, &mut self.publication);
             }
         }
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
@@ -353,7 +354,7 @@ impl Engine {
         }
         for (place, bus) in self.buses.iter_mut().enumerate() {
             if let Some(at) = due[place].filter(|_| bus.next_cycle().is_some()) {
-                bus.prepare();
+                bus.prepare(self.clock.trusted().map(|time| time.system_at(at)));
                 self.schedule.prepared(place, at);
             }
         }

@@ -182,7 +182,7 @@ mod tests {
         // 300 us behind an instant: 1000 cycles of 300 ns.
         let next = run(&mut lock, &time, at(300_000), 1_000);
         assert_eq!(lock.phase(), Phase { state: LockState::Pulling, error: DurationNs(300) });
-        let next = run(&mut lock, &time, next, 98);
+        let next = run(&mut lock, &time, next, 96);
         assert_eq!(lock.phase(), Phase { state: LockState::Pulling, error: DurationNs::ZERO });
         let next = run(&mut lock, &time, next, 1);
         assert_eq!(lock.phase(), Phase { state: LockState::Locked, error: DurationNs::ZERO });

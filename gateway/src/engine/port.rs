@@ -37,8 +37,13 @@ pub trait EthernetPort {
     /// Receives the next frame: its port and its length in `buffer`, in bytes; `None` if none waits.
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)>;
 
-    /// Sends a frame now or not at all; `false` when it could not be sent.
-    fn send(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> bool;
+    /// Sends a frame or nothing; `false` when it could not be sent. It leaves now, or at `at` where the port holds frames.
+    fn send(&mut self, at: MonotonicTime, port: Port, frame: &[u8]) -> bool;
+
+    /// Whether frames are held until their instant: then they are handed over as soon as they are built.
+    fn holds_frames(&self) -> bool {
+        false
+    }
 }
 
 /// An input from a CAN controller.
@@ -78,4 +83,15 @@ pub enum SouthPort<'a> {
     Ethernet(&'a mut dyn EthernetPort),
     /// The controller of a CANopen or DeviceNet bus.
     Can(&'a mut dyn CanPort),
+}
+
+impl SouthPort<'_> {
+    /// Whether frames are held until their instant.
+    #[must_use]
+    pub fn holds_frames(&self) -> bool {
+        match self {
+            Self::Ethernet(port) => port.holds_frames(),
+            Self::Can(_) => false,
+        }
+    }
 }

@@ -98,10 +98,11 @@ impl Schedule {
         taken.filter(|_| !left_out)
     }
 
-    /// The instant for which frames go out now; `None` while frames wait for theirs.
-    pub fn take_sendable(&mut self, place: usize, now: MonotonicTime) -> Option<MonotonicTime> {
+    /// The instant for which frames go out now; `None` while frames wait for theirs. A port that `holds` frames gets them ahead.
+    pub fn take_sendable(&mut self, place: usize, now: MonotonicTime, holds: bool) -> Option<MonotonicTime> {
         match self.buses[place].prepared {
             None => Some(now),
+            Some(_) if holds => self.buses[place].prepared.take(),
             Some(_) => self.take_prepared(place, now, false),
         }
     }
@@ -180,12 +181,19 @@ mod tests {
     #[test]
     fn prepared_cycle_is_taken_at_its_instant_and_dropped_if_left_out() {
         let mut schedule = schedule();
-        assert_eq!(schedule.take_sendable(0, at(1)), Some(at(1)), "nothing waits");
+        assert_eq!(schedule.take_sendable(0, at(1), false), Some(at(1)), "nothing waits");
         schedule.prepared(0, at(10_000));
         assert_eq!(schedule.take_prepared(0, at(9_999), false), None);
-        assert_eq!(schedule.take_sendable(0, at(9_999)), None);
+        assert_eq!(schedule.take_sendable(0, at(9_999), false), None);
         assert_eq!(schedule.take_prepared(0, at(10_001), false), Some(at(10_000)));
         assert_eq!(schedule.take_prepared(0, at(10_001), false), None, "once");
+        schedule.prepared(0, at(12_000));
+        assert_eq!(
+            schedule.take_sendable(0, at(11_900), true),
+            Some(at(12_000)),
+            "ahead to a port that holds"
+        );
+        assert_eq!(schedule.take_sendable(0, at(11_900), true), Some(at(11_900)));
         schedule.prepared(0, at(12_000));
         assert_eq!(schedule.take_prepared(0, at(11_000), true), None);
         assert_eq!(schedule.take_prepared(0, at(12_000), false), None);

@@ -421,11 +421,13 @@ mod tests {
             (12, &[1, 0xE240]),
             (16, &[0x0102, 0x0304, 0x0506, 0x0708]),
             (20, &[0, 0, 0, 11, 0, 0, 0, 12, 0, 0, 0, 13, 0, 0, 0, 14, 0, 0, 0, 15]),
+            // Locked, -789
+            (40, &[2, 0, 0xFFFF, 0xFCEB]),
         ];
         for (at, values) in expected_box {
             assert_eq!(&of_box[*at..at + values.len()], *values, "register {at}");
         }
-        assert_eq!(of_box[40..], [0; 24]);
+        assert_eq!(of_box[44..], [0; 20]);
 
         let first = registers(&status, 64, 64).unwrap();
         let expected: &[(usize, &[u16])] = &[

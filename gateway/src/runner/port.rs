@@ -148,14 +148,20 @@ impl EthernetPort for PacketPort {
         None
     }
 
-    fn send(&mut self, _now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+    fn send(&mut self, at: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+        let holds = self.holds_frames();
         let socket =
             PORTS.iter().position(|known| *known == port).and_then(|number| self.sockets.get(number));
         let Some(socket) = socket else { return false };
         if let Some(tap) = self.tap.as_mut() {
-            tap.frame(clock::realtime_now(), Side::South(port), frame);
+            let at = if holds { clock::realtime_of(at) } else { clock::realtime_now() };
+            tap.frame(at, Side::South(port), frame);
         }
-        socket.send(frame).is_ok()
+        if holds { socket.send_at(frame, at).is_ok() } else { socket.send(frame).is_ok() }
+    }
+
+    fn holds_frames(&self) -> bool {
+        self.sockets.iter().all(PacketSocket::launches)
     }
 }
 

@@ -15,6 +15,7 @@ pub mod ethtool;
 pub mod gate;
 pub mod interface_lock;
 pub mod interfaces;
+pub mod launch;
 pub mod link;
 pub mod packet_socket;
 pub mod phc;

@@ -1,7 +1,7 @@
 //! Whole Ethernet frames of one EtherType on one interface (`AF_PACKET`).
 //!
-//! The south bus of a SERCOS box: frames leave past the queueing discipline and arrive with the kernel's time
-//! stamp; frames sent by this host are not seen. Sending and receiving never wait and never allocate.
+//! The south bus of a SERCOS box: frames leave past the queueing discipline, or at a given instant by one that holds them, and
+//! arrive with the kernel's time stamp; frames sent by this host are not seen. Sending and receiving never wait and never allocate.
 #![allow(unsafe_code)]
 
 use std::io;
@@ -12,7 +12,10 @@ use arrayvec::ArrayVec;
 use rustix::net::{AddressFamily, SendFlags, SocketFlags, SocketType, send, socket_with};
 use thiserror::Error;
 
-use super::clock::KernelTime;
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+use super::clock::{self, KernelTime};
+use super::launch;
 use super::link::{self, LinkError, LinkState};
 use super::option::{counters, set_option};
 use super::receive::{enable_time_stamps, receive, wait_for_input};
@@ -25,6 +28,9 @@ const OUTGOING_SKIPPED_MAX: usize = 32;
 
 /// Place of `sll_pkttype` in a `sockaddr_ll`.
 const PACKET_TYPE_AT: usize = std::mem::offset_of!(libc::sockaddr_ll, sll_pkttype);
+
+/// A frame that would have to leave sooner is too late for a discipline that throws away what is late.
+const LAUNCH_MIN: DurationNs = DurationNs::from_micros(100);
 
 /// Room for received frames in the kernel: 64 cycles of eight frames of the longest kind.
 const RECEIVE_BUFFER_LEN: i32 = 1 << 20;
@@ -95,6 +101,8 @@ pub struct PacketSocket {
     index: i32,
     mac: [u8; 6],
     time_stamps: bool,
+    /// Frames have an instant at which they leave.
+    launches: bool,
 }
 
 impl PacketSocket {
@@ -132,8 +140,12 @@ impl PacketSocket {
             return Err(OpenError::NotEthernet { name: owned(), hardware_type });
         }
 
-        set_option(socket.as_fd(), libc::SOL_PACKET, libc::PACKET_QDISC_BYPASS, &1_i32)
-            .map_err(|error| system("PACKET_QDISC_BYPASS", error))?;
+        let launches = launch::holds_frames(index) && launch::enable(socket.as_fd()).is_ok();
+        // What is to be held until its instant has to go through the discipline that holds it.
+        if !launches {
+            set_option(socket.as_fd(), libc::SOL_PACKET, libc::PACKET_QDISC_BYPASS, &1_i32)
+                .map_err(|error| system("PACKET_QDISC_BYPASS", error))?;
+        }
         // Older kernels do not know this one; `recv` looks at the packet type in any case.
         let _ = set_option(socket.as_fd(), libc::SOL_PACKET, libc::PACKET_IGNORE_OUTGOING, &1_i32);
         // A smaller buffer than asked for is still a working one.
@@ -163,7 +175,7 @@ impl PacketSocket {
         if bound != 0 {
             return Err(system("bind", io::Error::last_os_error()));
         }
-        Ok(Self { socket, name: owned(), index, mac, time_stamps })
+        Ok(Self { socket, name: owned(), index, mac, time_stamps, launches })
     }
 
     /// Name of the interface.
@@ -182,6 +194,23 @@ impl PacketSocket {
     #[must_use]
     pub const fn has_time_stamps(&self) -> bool {
         self.time_stamps
+    }
+
+    /// Whether frames are held until the instant that [`Self::send_at`] gives them.
+    #[must_use]
+    pub const fn launches(&self) -> bool {
+        self.launches
+    }
+
+    /// Hands over one whole frame that is to leave at this instant, or as soon as the kernel can if that is nearly past or over.
+    /// Only where frames are held: [`Self::launches`].
+    ///
+    /// # Errors
+    /// [`LinkError`]: the frame will not leave. One that the kernel throws away later, because it came too late, is not told.
+    pub fn send_at(&self, frame: &[u8], at: MonotonicTime) -> Result<(), LinkError> {
+        let at = at.max(clock::monotonic_now() + LAUNCH_MIN);
+        launch::send(self.socket.as_fd(), frame, clock::tai_of(at))
+            .map_err(|error| LinkError::from_io(&error))
     }
 
     /// State of the interface now.

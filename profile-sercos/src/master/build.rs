@@ -62,7 +62,8 @@ impl Network {
                 self.build_telegrams([lengths; 2], None, None, search);
             }
             _ => {
-                let extended = self.time.field(self.cycle_count).filter(|_| switching.is_none());
+                let used = self.config.system_time && switching.is_none();
+                let extended = used.then(|| self.time.field(self.cycle_count));
                 let lengths = [self.layout.mdt_len, self.layout.at_len].map(|len| len.map(usize::from));
                 self.build_telegrams(lengths, extended, hot_plug, search);
             }
@@ -143,28 +144,34 @@ impl Network {
 /// The system time as it is sent in the extended field.
 #[derive(Debug, Default)]
 pub(super) struct TimeField {
-    /// At the start of the next cycle; `None` sends none.
+    /// At the start of the next cycle, where it is known.
     pub now: Option<SystemTime>,
-    /// The time sent, latched for eight cycles, and its toggle.
-    latched: Option<(SystemTime, bool)>,
+    /// The time sent, latched for eight cycles.
+    latched: Option<SystemTime>,
+    /// Changes with each new time.
+    toggle: bool,
 }
 
 impl TimeField {
     /// The extended field with the fragment of the system time that belongs to this cycle: seconds and nanoseconds
-    /// in four halves, each sent in two cycles, latched for all eight.
-    fn field(&mut self, cycle_count: u8) -> Option<Extended> {
+    /// in four halves, each sent in two cycles, latched for all eight. Without a time for the first of them all eight say that there
+    /// is none.
+    fn field(&mut self, cycle_count: u8) -> Extended {
+        let now = self.now.take();
         if cycle_count == 0 {
-            let toggle = self.latched.is_some_and(|(_, toggle)| toggle);
-            self.latched = self.now.map(|time| (time, !toggle));
+            self.latched = now;
+            self.toggle ^= now.is_some();
         }
-        let (SystemTime(nanos), toggle) = self.latched?;
+        let toggle = if self.toggle { Extended::TIME_TOGGLE } else { 0 };
+        let Some(SystemTime(nanos)) = self.latched else {
+            return Extended { word: toggle, time_fragment: 0 };
+        };
         let seconds = u32::try_from(nanos / 1_000_000_000 % (1 << 32)).unwrap_or(u32::MAX);
         let nanos = u32::try_from(nanos % 1_000_000_000).unwrap_or(0);
         let word = if cycle_count < 4 { seconds } else { nanos };
         let [a, b, c, d] = word.to_le_bytes();
         let half = if cycle_count & 2 == 0 { [c, d] } else { [a, b] };
-        let toggle = if toggle { Extended::TIME_TOGGLE } else { 0 };
-        Some(Extended { word: Extended::TIME_VALID | toggle, time_fragment: u16::from_le_bytes(half) })
+        Extended { word: Extended::TIME_VALID | toggle, time_fragment: u16::from_le_bytes(half) }
     }
 }
 
@@ -208,23 +215,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn system_time_is_latched_for_eight_cycles() {
-        let mut time =
-            TimeField { now: Some(SystemTime(0x1234_5678 * 1_000_000_000 + 0x0ABC_DEF0)), latched: None };
-        let mut fields = Vec::new();
-        for cycle in 0..8 {
-            fields.push(time.field(cycle).unwrap());
-            time.now = Some(SystemTime(0));
-        }
-        let halves: Vec<_> = fields.iter().map(|field| field.time_fragment).collect();
-        assert_eq!(halves, [0x1234, 0x1234, 0x5678, 0x5678, 0x0ABC, 0x0ABC, 0xDEF0, 0xDEF0]);
-        let first = Extended::TIME_VALID | Extended::TIME_TOGGLE;
-        assert!(fields.iter().all(|field| field.word == first));
-        assert_eq!(time.field(0), Some(Extended { word: Extended::TIME_VALID, time_fragment: 0 }));
-        time.now = None;
-        assert_eq!(
-            (time.field(1).map(|field| field.word), time.field(0)),
-            (Some(Extended::TIME_VALID), None)
-        );
+    fn system_time_is_latched_for_eight_cycles_and_said_to_be_missing_where_it_is() {
+        let mut time = TimeField::default();
+        let mut round = |first: Option<u64>| {
+            let mut fields = Vec::new();
+            for cycle in 0..8 {
+                // Those of the later cycles do not count.
+                time.now = if cycle == 0 { first.map(SystemTime) } else { Some(SystemTime(1)) };
+                fields.push(time.field(cycle));
+            }
+            assert!(fields.iter().all(|field| field.word == fields[0].word));
+            let halves: Vec<_> = fields.iter().map(|field| field.time_fragment).collect();
+            (fields[0].word, halves)
+        };
+        let (valid, toggle) = (Extended::TIME_VALID, Extended::TIME_TOGGLE);
+        let halves = vec![0x1234, 0x1234, 0x5678, 0x5678, 0x0ABC, 0x0ABC, 0xDEF0, 0xDEF0];
+        assert_eq!(round(Some(0x1234_5678 * 1_000_000_000 + 0x0ABC_DEF0)), (valid | toggle, halves));
+        assert_eq!(round(Some(0)), (valid, vec![0; 8]));
+        assert_eq!(round(None), (0, vec![0; 8]));
+        assert_eq!(round(Some(7)), (valid | toggle, vec![0, 0, 0, 0, 0, 0, 7, 7]));
+        assert_eq!(round(None), (toggle, vec![0; 8]), "the toggle waits for the next time");
     }
 }

@@ -166,6 +166,9 @@ pub struct MasterConfig {
     pub slave_valid_misses: u16,
     /// S-0-1003, MST losses which the slaves bear in CP3 and CP4.
     pub mst_losses: u16,
+    /// MDT0 carries the SERCOS time in its extended field: S-0-1032 tells the slaves so. What it is comes from
+    /// [`Master::set_system_time`](super::Master::set_system_time); while nothing comes, the field says that it is not valid.
+    pub system_time: bool,
     /// S-0-1027.0.1, requested MTU of the unified communication channel in bytes.
     pub mtu: u16,
     /// A hot-plug field at the start of every telegram, as slaves before specification 1.3.0 need it, and not
@@ -206,6 +209,7 @@ impl MasterConfig {
             svc: SvcLimits::default(),
             slave_valid_misses: 2,
             mst_losses: 10,
+            system_time: false,
             mtu: 1500,
             hot_plug_in_all: true,
             list_capacity: 1024,

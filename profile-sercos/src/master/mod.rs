@@ -423,8 +423,9 @@ impl Master {
         }
     }
 
-    /// System time at the start of the next cycle for the extended field of MDT0; `None` sends none. Whether the
-    /// field is used is told to the slaves when CP3 is prepared.
+    /// System time at the start of the next cycle, for the extended field of MDT0; `None` if it is not known. Every eighth cycle
+    /// begins to send one, and needs its own. Slaves get it where the configuration says that they do
+    /// ([`MasterConfig::system_time`]).
     pub fn set_system_time(&mut self, time: Option<SystemTime>) {
         self.net.time.now = time;
     }

@@ -188,7 +188,7 @@ impl Network {
             layout: &self.layout,
             places: self.layout.slaves.get(index).and_then(Option::as_ref),
             check,
-            extended: self.time.now.is_some(),
+            extended: self.config.system_time,
         };
         let request = step.request(instance, station, &values);
         station.channel.submit_own(request);

@@ -10,6 +10,8 @@ use profile_cip::device::motion_device::SyncState;
 use profile_cip::wire::class1::Class1Datagram;
 use profile_cip::wire::motion::CommandFrame;
 use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_sercos::wire::extended::{EXTENDED_OFFSET, Extended};
+use profile_sercos::wire::header::{HEADER_LEN, Header, Kind};
 
 use crate::chain::{Bus, Chain};
 use crate::scenario::program;
@@ -152,4 +154,50 @@ fn neither_unlocking_nor_locking_moves_an_axis() {
         let deviation = statistics.percent(statistics.deviation);
         assert!(deviation <= 1.0, "{chain}: {deviation} % of the velocity, {statistics:?}");
     }
+}
+
+/// The extended field of each MDT0 that comes back from the line, with when it was sent.
+fn extended_fields(rig: &mut Rig) -> Rc<RefCell<Vec<(MonotonicTime, Extended)>>> {
+    let fields = Rc::new(RefCell::new(Vec::new()));
+    let (seen, clock) = (Rc::clone(&fields), rig.clock());
+    rig.tamper_frame = Some(Box::new(move |frame| {
+        let frame = frame.as_slice();
+        let header = Header::parse(frame).ok();
+        if header.is_some_and(|header| header.telegram.kind() == Kind::Mdt && header.telegram.number() == 0) {
+            let field = Extended::parse(&frame[HEADER_LEN + EXTENDED_OFFSET..]).expect("a whole MDT0");
+            seen.borrow_mut().push((clock.get(), field));
+        }
+        true
+    }));
+    fields
+}
+
+/// Seconds and nanoseconds of SERCOS time, each half of them in two cycles, are those of the first of the eight cycles.
+#[test]
+fn slaves_get_system_time() {
+    let mut rig = CHAINS[0].ready();
+    rig.gateway_clock.set_offset(rig.now(), DurationNs(-777_123_456_789));
+    rig.run_for(SECOND);
+    let fields = extended_fields(&mut rig);
+    rig.run_for(DurationNs::from_millis(100));
+    let fields = fields.take();
+    let valid = |field: &Extended| field.word & Extended::TIME_VALID != 0;
+    let toggle = |field: &Extended| field.word & Extended::TIME_TOGGLE;
+    assert!(fields.iter().all(|(_, field)| valid(field)), "{fields:?}");
+    let begins = fields.windows(2).position(|pair| toggle(&pair[0].1) != toggle(&pair[1].1));
+    let rounds = fields[begins.expect("another time comes") + 1..].chunks_exact(8);
+    assert!(rounds.len() >= 5);
+    for round in rounds {
+        let half = |cycle: usize| u64::from(round[cycle].1.time_fragment);
+        assert!(round.iter().step_by(2).zip(round.iter().skip(1).step_by(2)).all(|(a, b)| a.1 == b.1));
+        let (seconds, nanos) = (half(0) << 16 | half(2), half(4) << 16 | half(6));
+        let sent = rig.gateway_clock.system(round[0].0);
+        assert_eq!(seconds * 1_000_000_000 + nanos, sent.0, "{round:?}");
+    }
+    // Time that is not proven is not sent.
+    rig.engine.set_sync(SyncState { grandmaster: None, synchronized: false, offset: 0 });
+    rig.run_for(DurationNs::from_millis(20));
+    let fields = extended_fields(&mut rig);
+    rig.run_for(DurationNs::from_millis(20));
+    assert!(!fields.take().iter().any(|(_, field)| valid(field)));
 }

@@ -5,7 +5,7 @@ use profile_sercos::master::config::{Connections, MasterConfig, Ports, SlaveConf
 use profile_sercos::master::layout::{ConnectionNeed, SlaveNeed};
 
 use super::{BuildError, Host, kind, modes, parameters};
-use crate::config::{Axis, AxisFunction, AxisKind, Config, Drive, Sercos};
+use crate::config::{Axis, AxisFunction, AxisKind, Config, Drive, Sercos, TimeSource};
 use crate::engine::bus::sercos::commissioner::{Commissioner, commissioner};
 use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
 use crate::mapping::{AxisUnits, Mapping, Reference, SercosAxis};
@@ -46,6 +46,7 @@ pub(super) fn bus(
     let drives: Vec<_> =
         axes.filter_map(|(number, axis)| Some((number, axis, config.sercos_drive(axis)?))).collect();
     let mut master = master_config(sercos, host);
+    master.system_time = config.time.source != TimeSource::None;
     for (_, axis, drive) in drives.iter().filter(|(.., drive)| drive.hot_plug) {
         let slave = master.slaves.iter_mut().find(|slave| slave.address == drive.address);
         if let Some(slave) = slave {

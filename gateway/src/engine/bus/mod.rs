@@ -110,8 +110,9 @@ pub trait South {
     /// Moves the grid: the next cycle begins by so much later, and all that follow it.
     fn shift_grid(&mut self, by: DurationNs);
 
-    /// Builds the frames of the next cycle, as far as the bus can do that before its instant.
-    fn prepare(&mut self);
+    /// Builds the frames of the next cycle, as far as the bus can do that before its instant. `system` is system time at that
+    /// instant, while it is to be trusted.
+    fn prepare(&mut self, system: Option<SystemTime>);
 
     /// Whether every drive that answers is in cyclic operation.
     fn is_up(&self) -> bool;

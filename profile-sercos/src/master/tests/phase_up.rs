@@ -306,20 +306,21 @@ fn a_soft_master_says_so() {
     rig.up_to(Phase::CP4);
     assert_eq!(rig.line.peers[0].value(Idn::COMMUNICATION_CONTROL), 1 << 4);
     // With a system time the extended field is announced as well, and used.
-    let mut rig = Rig::of(&[1]);
+    let mut rig = Rig::with(MasterConfig { system_time: true, ..config(&[1]) }, &[1]);
     let classes = [0x01, 0x02, 0x02, 0x03, 0x01, 0x0A].to_vec();
     let peer = &mut rig.line.peers[0];
     peer.parameters.get_mut(&Idn::SCP_CLASSES).unwrap().bytes = classes;
     let control = peer.parameters[&Idn::CYCLE_TIME].clone();
     peer.parameters.insert(Idn::COMMUNICATION_CONTROL, control);
     let nanos = 0x1234_5678 * 1_000_000_000 + 0x0102_0304;
-    rig.master.set_system_time(Some(profile_generic::time::SystemTime(nanos)));
+    let time = Some(profile_generic::time::SystemTime(nanos));
     rig.up_to(Phase::CP4);
     assert_eq!(rig.line.peers[0].value(Idn::COMMUNICATION_CONTROL), 1 << 4 | 1 << 2);
     rig.run_until("at the start of a round", |rig| rig.cycles.last().unwrap().1 & 0x70 == 0x70);
     let mut fragments = Vec::new();
     let mut words = Vec::new();
     for _ in 0..16 {
+        rig.master.set_system_time(time);
         rig.step();
         let seen = &rig.line.peers[0].mdt_seen;
         words.push(u16::from_le_bytes([seen[8], seen[9]]));

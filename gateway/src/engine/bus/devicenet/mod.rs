@@ -373,7 +373,7 @@ impl South for DevicenetBus {
         self.master.shift_grid(by);
     }
 
-    fn prepare(&mut self) {}
+    fn prepare(&mut self, _system: Option<SystemTime>) {}
 
     fn is_up(&self) -> bool {
         self.up

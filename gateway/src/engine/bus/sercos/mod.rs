@@ -602,7 +602,8 @@ impl South for SercosBus {
         self.master.shift_grid(DurationNs(by.0.clamp(-most, most)));
     }
 
-    fn prepare(&mut self) {
+    fn prepare(&mut self, system: Option<SystemTime>) {
+        self.master.set_system_time(system);
         self.master.prepare();
     }
 
