@@ -17,6 +17,7 @@ mod script;
 mod signal;
 mod simulate;
 mod snapshot;
+mod status;
 mod translate;
 
 use std::io::{self, Write as _};
@@ -42,6 +43,8 @@ enum Command {
     Demo(DemoArguments),
     /// Run the gateway.
     Run(RunArguments),
+    /// Show what a running gateway does now: buses, system time, axes and faults.
+    Status(StatusArguments),
     /// Check mapping tables, overlays and a configuration, and explain the findings.
     Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
@@ -95,6 +98,20 @@ struct RunArguments {
     /// Offer local control of the axes on this Unix socket (docs/local-control.md).
     #[arg(long, value_name = "SOCKET")]
     local: Option<PathBuf>,
+}
+
+/// Arguments of `status`.
+#[derive(Debug, Args)]
+struct StatusArguments {
+    /// The Unix socket of the running gateway (`run --local`).
+    #[arg(long, value_name = "SOCKET", default_value = "/run/axisbridge/local")]
+    local: PathBuf,
+    /// Show it again each second, until Ctrl-C.
+    #[arg(long)]
+    watch: bool,
+    /// Print one JSON object; with `--watch` one a line.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Arguments of `check`.
@@ -581,6 +598,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
+        Command::Status(arguments) => status::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),

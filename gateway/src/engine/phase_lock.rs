@@ -46,6 +46,16 @@ impl LockState {
     /// All of them, by their codes.
     pub const ALL: [Self; 3] = [Self::Free, Self::Pulling, Self::Locked];
 
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Free => "free",
+            Self::Pulling => "pulling",
+            Self::Locked => "locked",
+        }
+    }
+
     /// Its code for programs outside.
     #[must_use]
     pub const fn code(self) -> u8 {

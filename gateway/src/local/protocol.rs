@@ -64,6 +64,8 @@ impl NamedParameter {
 /// A request of a client.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request {
+    /// Show the whole gateway.
+    Box,
     /// List the axes.
     Axes,
     /// List the parameters.
@@ -96,7 +98,7 @@ pub enum Request {
 pub enum BadRequest {
     /// The first word is none of the protocol's.
     #[error(
-        "unknown word `{0}`: expected axes, status, enable, disable, stop, reset, jog, move, home, parameters, read or write"
+        "unknown word `{0}`: expected box, axes, status, enable, disable, stop, reset, jog, move, home, parameters, read or write"
     )]
     Word(String),
     /// The word needs an axis.
@@ -177,6 +179,7 @@ pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Resu
     let mut words = line.split_ascii_whitespace();
     let word = words.next().unwrap_or_default();
     let request = match word {
+        "box" => Request::Box,
         "axes" => Request::Axes,
         "parameters" => Request::Parameters,
         "read" => access("read", &mut words, axes, parameters)?,
@@ -453,6 +456,7 @@ mod tests {
     fn every_request_is_read() {
         let axes = axes();
         let parse = |line: &str, axes: &[String]| parse(line, axes, &parameters());
+        assert_eq!(parse("box", &axes), Ok(Request::Box));
         assert_eq!(parse("axes", &axes), Ok(Request::Axes));
         assert_eq!(parse("  status\ty-2 ", &axes), Ok(Request::Status { axis: 1 }));
         assert_eq!(parse("parameters", &axes), Ok(Request::Parameters));
@@ -517,6 +521,7 @@ mod tests {
             "move x 1 velocity=1 velocity=2",
             "move x 1 velocity=1 by=hand",
             "axes x",
+            "box x",
             "parameters x",
             "read",
             "read x",

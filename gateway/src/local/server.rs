@@ -19,11 +19,13 @@ use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::mpsc;
 use tracing::{info, warn};
 
+use super::overview::{Known, Overview};
 use super::protocol::{self, BadRequest, LINE_MAX, NamedParameter};
-use crate::config::AxisKind;
+use crate::config::{AxisKind, TimeSource};
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
 use crate::latest::Reader;
 use crate::status::BoxStatus;
+use crate::time::source::TimeView;
 
 /// Clients connected at the same time.
 const CLIENTS_MAX: usize = 4;
@@ -51,9 +53,24 @@ pub struct Shared {
     pub parameters: Vec<NamedParameter>,
     /// The status of the gateway.
     pub status: Reader<BoxStatus>,
+    /// Its name in the configuration.
+    pub name: String,
+    /// Where system time comes from.
+    pub source: TimeSource,
+    /// System time.
+    pub time: TimeView,
 }
 
 impl Shared {
+    /// The whole gateway, as the reply to `box`.
+    fn overview(&self) -> String {
+        let known = Known { name: &self.name, names: &self.names, kinds: &self.kinds, source: self.source };
+        let overview = Overview::of(&known, &self.status.read(), &self.time.read());
+        // The object has texts, numbers and lists, and nothing that JSON does not know.
+        let json = serde_json::to_string(&overview).unwrap_or_default();
+        format!("ok box {json}\n")
+    }
+
     /// The state of an axis in the words of the protocol.
     fn state(&self, axis: usize) -> String {
         let status = self.status.read();
@@ -258,6 +275,7 @@ impl Client {
         let line = line.as_ref().map_err(|error| protocol::bad("-", error))?;
         let Shared { names, parameters, .. } = &*self.shared;
         match protocol::parse(line, names, parameters).map_err(|error| protocol::bad(line, &error))? {
+            protocol::Request::Box => Err(self.shared.overview()),
             protocol::Request::Axes => Err(protocol::list(names, |axis| self.shared.state(axis))),
             protocol::Request::Status { axis } => {
                 Err(protocol::done("status", &names[axis], &self.shared.state(axis)))
@@ -358,6 +376,8 @@ mod tests {
     use crate::engine::parameter::ParameterFailure;
     use crate::latest::latest;
     use crate::status::tests::distinct;
+    use crate::time::ptp::FollowerConfig;
+    use crate::time::status::TimeStatus;
 
     /// A server, and the engine's side of its queues.
     struct Bench {
@@ -380,7 +400,17 @@ mod tests {
             range: None,
         };
         let kinds = vec![AxisKind::Rotary, AxisKind::Linear];
-        Shared { names, kinds, parameters: vec![code], status }
+        let follower =
+            FollowerConfig { identity: [1; 8], domain: 0, threshold: 10_000, asymmetry: 0, seed: 1 };
+        Shared {
+            names,
+            kinds,
+            parameters: vec![code],
+            status,
+            name: "cell".to_owned(),
+            source: TimeSource::Ptp,
+            time: TimeView::of(TimeStatus::ptp(&follower)),
+        }
     }
 
     fn queues() -> (ClientEnd, rtrb::Consumer<Request>, rtrb::Producer<Answer>) {
@@ -481,6 +511,21 @@ mod tests {
         bench.answers.push(Answer { client: number, id: second, result: Err(failure) }).unwrap();
         assert_eq!(hear(&mut client).await, "ok read y code=77 unit=mHz\n");
         assert_eq!(hear(&mut client).await, "error write x value: the value is out of range\n");
+    }
+
+    #[tokio::test]
+    async fn the_whole_gateway_is_one_object_on_one_line() {
+        let bench = Bench::start("box");
+        let mut client = bench.connect().await;
+        say(&mut client, "box\n").await;
+        let reply = hear(&mut client).await;
+        let json = reply.strip_prefix("ok box ").expect("the reply to `box`");
+        let overview: Overview = serde_json::from_str(json).unwrap();
+        let axes: Vec<_> =
+            overview.axes.iter().map(|axis| (axis.name.as_str(), axis.unit.as_str())).collect();
+        assert_eq!((overview.name.as_str(), axes), ("cell", vec![("x", "rev"), ("y", "mm")]));
+        assert_eq!((overview.time.source.as_str(), overview.time.synchronized), ("ptp", false));
+        assert_eq!(overview.cycles.phase_error_ns, -789);
     }
 
     #[tokio::test]

@@ -59,7 +59,7 @@ use crate::sys::can_socket;
 use crate::sys::interface_lock::{InterfaceLock, LockError};
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
 use crate::time::object::time_sync;
-use crate::time::source::{Place, SourceError, TimeService};
+use crate::time::source::{Place, SourceError, TimeService, TimeView};
 
 /// How often the commissioning of drives that come later goes on.
 const COMMISSION_INTERVAL: Duration = Duration::from_millis(5);
@@ -311,8 +311,10 @@ pub fn start(
             }
         });
     }
-    let socket =
-        extras.local.map(|path| serve_local(path, config, &mut engine, &status, &runtime)).transpose()?;
+    let socket = extras
+        .local
+        .map(|path| serve_local((path, config), &mut engine, &status, time.view(), &runtime))
+        .transpose()?;
     let stop_notices = Arc::new(AtomicBool::new(false));
     let names = config.axes.iter().map(|axis| axis.name.clone()).collect();
     runtime.spawn(log_notices(notices, names, Arc::clone(&stop_notices)));
@@ -368,10 +370,10 @@ fn modbus_parameters(
 
 /// Offers local control of all axes on a socket.
 fn serve_local(
-    path: &Path,
-    config: &Config,
+    (path, config): (&Path, &Config),
     engine: &mut Engine,
     status: &Reader<BoxStatus>,
+    time: TimeView,
     runtime: &tokio::runtime::Runtime,
 ) -> Result<SocketFile, StartError> {
     let (local, end) = LocalNorth::new(config.axes.len());
@@ -380,6 +382,9 @@ fn serve_local(
         kinds: config.axes.iter().map(|axis| axis.kind).collect(),
         parameters: NamedParameter::of(engine.mapping()),
         status: status.clone(),
+        name: config.name.clone(),
+        source: config.time.source,
+        time,
     };
     let (server, file) = LocalServer::bind(path, shared, end)
         .map_err(|source| StartError::Local { path: path.display().to_string(), source })?;

@@ -80,6 +80,10 @@ pub(super) fn head(out: &mut String, names: &[String], update_period: &str) {
         "\
 [box]
 name = \"axisbridge\"
+
+# CHANGE: a controller on another machine shares its time by PTP.
+# [time]
+# source = \"ptp\"
 "
     );
     for (number, axes) in (1..).zip(names.chunks(DEVICE_AXES_MAX)) {

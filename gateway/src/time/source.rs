@@ -45,6 +45,12 @@ const PAUSE: Duration = Duration::from_secs(2);
 pub struct TimeView(Arc<Mutex<TimeStatus>>);
 
 impl TimeView {
+    /// A view of a state that stays.
+    #[must_use]
+    pub fn of(status: TimeStatus) -> Self {
+        Self(Arc::new(Mutex::new(status)))
+    }
+
     /// The state now.
     #[must_use]
     pub fn read(&self) -> TimeStatus {
@@ -137,7 +143,7 @@ impl TimeService {
         }
         let (publisher, reader) = latest(CycleTime::of(&first));
         let is_host = matches!(config.source, TimeSource::Host | TimeSource::Shared);
-        let view = TimeView(Arc::new(Mutex::new(first)));
+        let view = TimeView::of(first);
         let control = Arc::new(Control::default());
         control.domain.store(config.domain, Ordering::Relaxed);
         let reporter = Reporter { publisher, view: view.clone(), said: None };

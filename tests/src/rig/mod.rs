@@ -663,6 +663,12 @@ impl Rig {
         result
     }
 
+    /// Has the SERCOS III telegrams handed over with their instant, as to a port that holds them until then. The line gets them at
+    /// once nevertheless.
+    pub fn hold_frames(&mut self) {
+        self.south.holds = true;
+    }
+
     /// When the last cycle of the first bus began, as its frames were sent: the MST, SYNC, or the first poll.
     #[must_use]
     pub fn cycle_sent_at(&self) -> Option<MonotonicTime> {

@@ -163,6 +163,8 @@ pub struct SouthQueue {
     pub outbound: Ring<()>,
     /// When it has begun to send last: that of the MST.
     pub sent_at: Option<MonotonicTime>,
+    /// Frames are handed over with their instant, as to a port that holds them until then.
+    pub holds: bool,
 }
 
 impl SouthQueue {
@@ -201,9 +203,13 @@ impl EthernetPort for SouthQueue {
         self.inbound.pop_into(buffer).map(|(len, ())| (Port::One, len))
     }
 
-    fn send(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
-        self.sent_at = Some(now);
+    fn send(&mut self, at: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+        self.sent_at = Some(at);
         port == Port::One && self.outbound.push(frame, ())
+    }
+
+    fn holds_frames(&self) -> bool {
+        self.holds
     }
 }
 

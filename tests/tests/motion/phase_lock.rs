@@ -10,6 +10,8 @@ use profile_cip::device::motion_device::SyncState;
 use profile_cip::wire::class1::Class1Datagram;
 use profile_cip::wire::motion::CommandFrame;
 use profile_generic::time::{DurationNs, MonotonicTime};
+use profile_sercos::checker::checked_bus::Tried;
+use profile_sercos::checker::{Rule, Violation};
 use profile_sercos::wire::extended::{EXTENDED_OFFSET, Extended};
 use profile_sercos::wire::header::{HEADER_LEN, Header, Kind};
 
@@ -200,4 +202,39 @@ fn slaves_get_system_time() {
     let fields = extended_fields(&mut rig);
     rig.run_for(DurationNs::from_millis(20));
     assert!(!fields.take().iter().any(|(_, field)| valid(field)));
+}
+
+/// A port that holds frames gets them a tenth of the cycle ahead, with the instant of the cycle; the axis moves as ever.
+#[test]
+fn telegrams_go_ahead_to_a_port_that_holds_them() {
+    let chain = CHAINS[0];
+    let cycle = chain.cycle();
+    let mut rig = chain.ready();
+    rig.run_for(SECOND);
+    assert!(rig.cycle_sent_at() <= Some(rig.now()), "by the cycle thread's own timing");
+    rig.hold_frames();
+    let config = chain.controller(&rig);
+    rig.connect_with(config, program());
+    let mut sent: Vec<MonotonicTime> = Vec::new();
+    let closed = |rig: &Rig| rig.controller.as_ref().is_none_or(Controller::is_closed);
+    let mut ahead = Vec::new();
+    // The line of the rig does not wait: what it gets ahead is early once.
+    let early = |violation: &Violation| matches!(violation.rule, Rule::MstInterval { .. });
+    rig.tolerating(early, |rig| {
+        while !closed(rig) {
+            rig.step();
+            let Some(at) = rig.cycle_sent_at().filter(|at| sent.last() != Some(at)) else { continue };
+            sent.push(at);
+            ahead.push(at.since(rig.now()));
+            assert!(sent.len() < 10_000, "{}", rig.log());
+        }
+    });
+    let lead = ahead[2];
+    assert!(lead > DurationNs::ZERO && lead <= DurationNs(cycle.0 / 10), "{lead}");
+    assert!(ahead[2..].iter().all(|ahead| *ahead == lead), "{ahead:?}");
+    // The controller has another grid than the bus had.
+    even(chain, &sent[2..], 3_000);
+    assert_eq!(sent.last().map(|at| off(&rig, *at, sent[sent.len() - 100].0, cycle)), Some(0));
+    assert_eq!(lock(&rig), LockState::Locked, "{}", rig.told());
+    assert_eq!((rig.report().failure, rig.report().steps_finished), (None, 3), "{}", rig.log());
 }

@@ -43,6 +43,41 @@ impl Gateway {
         fs::read_to_string(&self.log).unwrap_or_default()
     }
 
+    /// `axisbridge status` while local control has the turntable: all is well, in words and as an object.
+    fn shows_its_status(&self) {
+        let status = |words: &[&str], socket: &PathBuf| {
+            let mut command = Command::new(axisbridge());
+            command.arg("status").args(words).arg("--local").arg(socket).stdin(Stdio::null());
+            let output = command.output().expect("the command can be started");
+            let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+            (output.status.code(), text(output.stdout), text(output.stderr))
+        };
+        let (code, text, errors) = status(&["--json"], &self.socket);
+        assert_eq!((code, errors.as_str()), (Some(0), ""), "{text}");
+        let object: serde_json::Value = serde_json::from_str(&text).expect("one object");
+        assert_eq!(object["state"], "ready", "{text}");
+        assert_eq!(
+            (&object["time"]["source"], &object["time"]["synchronized"]),
+            (&"shared".into(), &true.into())
+        );
+        let [turntable, slide] = [0, 1].map(|axis| &object["axes"][axis]);
+        assert_eq!(
+            (&turntable["name"], &turntable["owner"]),
+            (&"turntable".into(), &"local".into()),
+            "{text}"
+        );
+        assert_eq!((&turntable["state"], &slide["owner"]), (&"operating".into(), &"nobody".into()), "{text}");
+        let position = turntable["position"].as_f64().expect("a number");
+        assert!((position + 0.5).abs() < 0.002, "{text}");
+        let (code, text, _) = status(&[], &self.socket);
+        assert_eq!(code, Some(0), "{text}");
+        let line = text.lines().find(|line| line.starts_with("turntable ")).expect("a line for the axis");
+        assert!(line.contains(" operating ") && line.contains(" local ") && line.contains("-0.5"), "{text}");
+        let (code, text, errors) = status(&[], &path("nobody.socket"));
+        assert_eq!((code, text.as_str()), (Some(1), ""));
+        assert!(errors.starts_with("no gateway answers at "), "{errors}");
+    }
+
     fn connect(&self) -> Client {
         let end = Instant::now() + Duration::from_secs(30);
         loop {
@@ -107,6 +142,7 @@ fn people_move_an_axis_home_it_and_leave_it() {
         assert!((value(&reply, "position=") - 0.75).abs() < 0.002, "{reply}");
         let reply = client.ask("move turntable -0.5 velocity=2 acceleration=5 by=drive");
         assert!((value(&reply, "position=") + 0.5).abs() < 0.002, "{reply}");
+        gateway.shows_its_status();
         let reply = client.ask("home slide");
         assert!(reply.starts_with("error home slide not-enabled: "), "{reply}");
         // Nothing switches the home switch of this simulated drive: it seeks until a stop replaces the order.
