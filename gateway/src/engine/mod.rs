@@ -260,8 +260,9 @@ impl Engine {
                 send(bus, port, (now, at), place, &mut self.schedule, &mut self.publication);
             }
         }
+        let next_call = self.end_call(now);
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
-            channel.transmit(now, &self.clock.base, &mut **port);
+            channel.transmit((now, next_call), &self.clock.base, &mut **port);
         }
         if self.ending.advance(now, self.clock.base.system_at(now), &mut self.axes) {
             self.buses.iter_mut().for_each(|bus| bus.stop(now));
@@ -271,7 +272,7 @@ impl Engine {
         let Self { buses, devices, axes, changes, ending, publication, .. } = self;
         let sources = Sources { stopping: ending.has_begun, buses, devices, axes, changes };
         publication.publish(now, changed, &sources);
-        self.end_call(now)
+        next_call
     }
 
     /// Sends what was built ahead and whose instant has come. What could only go out much too late does not.

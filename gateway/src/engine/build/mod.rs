@@ -150,7 +150,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         let number = u8::try_from(number).unwrap_or(u8::MAX);
         let channel = DeviceChannel::new(
             number,
-            device_config(device, &members, &mapping, config.cycle_time()),
+            device_config(device, &members, &mapping),
             device_end,
             configs,
             &mapping,
@@ -308,12 +308,7 @@ fn device_type(members: &[(usize, &Axis)]) -> u16 {
     }
 }
 
-fn device_config(
-    device: &Device,
-    members: &[(usize, &Axis)],
-    mapping: &Mapping,
-    bus_cycle: profile_generic::time::DurationNs,
-) -> DeviceConfig {
+fn device_config(device: &Device, members: &[(usize, &Axis)], mapping: &Mapping) -> DeviceConfig {
     let axis = |(_, axis): &(usize, &Axis)| AxisConfig {
         kind: match axis.function {
             AxisFunction::Drive => ControlKind::Active,
@@ -334,7 +329,6 @@ fn device_config(
         power_structure_class_id: device.power_structure_class_id,
         // Updates of the fixed format have no time stamps.
         supports_sync: device.connection_format == Format::Variable,
-        poll_interval_ns: u64::try_from(bus_cycle.as_nanos()).unwrap_or(0),
         transmission_processing_ns: TRANSMISSION_PROCESSING_NS,
     }
 }

@@ -302,9 +302,15 @@ impl DeviceChannel {
         true
     }
 
-    /// Sends what is due on the I/O connection, and answers the explicit side.
-    pub fn transmit(&mut self, now: MonotonicTime, time: &TimeBase, port: &mut dyn NorthPort) {
+    /// Sends what is due on the I/O connection before `next_call`, when this is called again, and answers the explicit side.
+    pub fn transmit(
+        &mut self,
+        (now, next_call): (MonotonicTime, MonotonicTime),
+        time: &TimeBase,
+        port: &mut dyn NorthPort,
+    ) {
         let system = time.system_at(now);
+        self.device.expect_poll(next_call);
         let Self { buffer, .. } = self;
         let data = CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN;
         if let Some(length) = self.device.poll_transmit(now, Some(system), &mut buffer[data..])

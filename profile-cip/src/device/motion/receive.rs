@@ -190,10 +190,7 @@ impl Engine {
             }
         }
         let fresh = matches!(verdict, Verdict::Fresh(_));
-        if fresh {
-            self.statistics.counters.applied += 1;
-            self.node.fresh_update();
-        }
+        self.statistics.counters.applied += u64::from(fresh);
         if let Some(connection) = &mut self.connection {
             connection.answer(header.update_id, now);
             connection.accepted(header.update_id, now, fresh);
@@ -236,6 +233,7 @@ impl Engine {
             self.config.supports_sync && header.node_control.contains(NodeControl::SYNC_CONTROL);
         if !synchronous {
             connection.stamps.forget();
+            self.node.fresh_update();
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
         }
         let (Some(received), Some(SystemTime(system_time))) = (header.time_stamp, system_time) else {
@@ -247,12 +245,11 @@ impl Engine {
         let skewed = Clock::is_skewed(time_stamp, period, system_time);
         if connection.schedule.mode == Mode::Asynchronous {
             connection.stamps.forget();
+            self.node.fresh_update();
             self.node.skew(skewed, now);
             if !skewed && self.clock.is_synchronized() {
                 let start = time_stamp.saturating_add(period.saturating_mul(2));
-                let in_ns =
-                    start.saturating_sub(system_time).saturating_sub(self.config.transmission_processing_ns);
-                connection.schedule.synchronize(header.update_id, in_ns, now);
+                connection.schedule.synchronize(header.update_id, start.saturating_sub(system_time), now);
             }
             // Until the clocks are proven the device goes on asynchronously, without trust in the time stamp.
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
@@ -264,7 +261,9 @@ impl Engine {
         }
         let cycle = i64::try_from(time_stamp.abs_diff(system_time)).unwrap_or(i64::MAX);
         let cycle = if time_stamp >= system_time { cycle } else { -cycle };
-        let processing = i64::try_from(self.config.transmission_processing_ns).unwrap_or(0);
+        if age != Age::Alarming {
+            self.node.fresh_update();
+        }
         match age {
             // Served at its time, but one of the clocks is wrong: no update arrives before the start of its own period. What is
             // below the step threshold says nothing: the update may have come while this call was under way.
@@ -288,7 +287,7 @@ impl Engine {
                 return Verdict::CommandsRefused;
             }
         }
-        connection.schedule.align(cycle.saturating_sub(processing), now);
+        connection.schedule.align(cycle, now);
         Verdict::Fresh(UpdateTimes { time_stamp: Some(time_stamp), period, paced_at })
     }
 

@@ -9,15 +9,20 @@
 //! Clause 2-2.1 adds the compensation, and its Table 2-2.2 shows -1000 for a controller that is 1000 ahead. When the
 //! offsets have changed by no more than the step threshold they become the new reference and the remaining variance
 //! is worked off by a thousandth of the update period per update (clause 2-2.2); beyond it the references are held.
+//!
+//! The clause wants uncorrected phase carried into what comes next. Its listing computes it only in an update without a change,
+//! and so loses it where offsets change in two updates in a row, and through a step of the master. Here it is kept with the
+//! references: the compensation is always what the offsets have changed since then, and the phase that was uncorrected then.
 
 /// State of the compensation. All values in ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct OffsetCompensation {
     reference: Option<Offsets>,
     current: Offsets,
-    variance: i64,
-    phase_correction: i64,
+    /// Phase that is not corrected yet, of the time before the references.
     phase_remaining: i64,
+    /// What is added to a time stamp.
+    compensation: i64,
     step: bool,
 }
 
@@ -46,25 +51,24 @@ impl OffsetCompensation {
             self.current = offsets;
             let device = offsets.device.saturating_sub(reference.device);
             let controller = offsets.controller.saturating_sub(reference.controller);
-            self.variance = device.saturating_sub(controller).saturating_add(self.phase_remaining);
-            self.phase_correction = 0;
-            self.phase_remaining = 0;
-            self.step = self.variance.saturating_abs() > step_threshold;
+            let variance = device.saturating_sub(controller).saturating_add(self.phase_remaining);
+            self.compensation = variance;
+            self.step = variance.saturating_abs() > step_threshold;
             if !self.step {
                 self.reference = Some(offsets);
+                self.phase_remaining = variance;
             }
         } else if !self.step {
             let pace = (period / 1000).max(1);
-            let left = self.variance.saturating_sub(self.phase_correction);
-            self.phase_correction = self.phase_correction.saturating_add(left.clamp(-pace, pace));
-            self.phase_remaining = self.variance.saturating_sub(self.phase_correction);
+            self.phase_remaining -= self.phase_remaining.clamp(-pace, pace);
+            self.compensation = self.phase_remaining;
         }
     }
 
     /// A time stamp of the controller in this device's system time, ns.
     #[must_use]
     pub fn compensate(&self, time_stamp: u64) -> u64 {
-        time_stamp.saturating_add_signed(self.variance.saturating_sub(self.phase_correction))
+        time_stamp.saturating_add_signed(self.compensation)
     }
 
     /// Forgets the reference: the connection is gone.
@@ -77,13 +81,57 @@ impl OffsetCompensation {
 mod tests {
     use super::*;
 
+    /// The rows of Table 2-2.2 (Table 25 of IEC 61800-7-202) with all of their columns, whose master is that of Table 2-2.1: its
+    /// time steps by 1000 in interval 2, the source learns of it in interval 3 and the destination in interval 4.
     #[test]
     fn a_step_of_the_master_follows_table_2_2_2() {
-        // Columns: controller offset, its time stamp, device offset, adjusted time stamp.
+        struct Side {
+            local: i64,
+            offset: i64,
+            last: i64,
+            time: u64,
+        }
+        let side = |local, offset, last, time| Side { local, offset, last, time };
+        // Master time; the controller, with its time stamp; the drive; offset compensation, adjusted time stamp.
+        let rows = [
+            (100, side(0, 100, 100, 100), 100, side(0, 100, 100, 100), 0, 100),
+            (200, side(100, 100, 100, 200), 200, side(100, 100, 100, 200), 0, 200),
+            (1300, side(200, 1100, 100, 1300), 1300, side(200, 100, 100, 300), -1000, 300),
+            (1400, side(300, 1100, 100, 1400), 1400, side(300, 1100, 100, 1400), 0, 1400),
+            (1500, side(400, 1100, 1100, 1500), 1500, side(400, 1100, 1100, 1500), 0, 1500),
+        ];
+        let mut compensation = OffsetCompensation::default();
+        for (interval, (master, controller, time_stamp, drive, offset_comp, adjusted)) in (1..).zip(rows) {
+            for known in [&controller, &drive] {
+                assert_eq!(known.time, known.local.saturating_add(known.offset).unsigned_abs(), "{interval}");
+            }
+            assert_eq!(
+                controller.time.max(drive.time),
+                master,
+                "{interval}: whoever knows has the master's time"
+            );
+            if let Some(last) = compensation.reference {
+                assert_eq!((last.controller, last.device), (controller.last, drive.last), "{interval}");
+            }
+            let offsets = Offsets { device: drive.offset, controller: controller.offset };
+            compensation.update(offsets, 500, 1000);
+            let found = compensation.compensate(time_stamp);
+            assert_eq!(
+                (found, found),
+                (adjusted, time_stamp.saturating_add_signed(offset_comp)),
+                "{interval}"
+            );
+            assert_eq!(found, drive.time, "{interval}: it is the drive's own time");
+        }
+    }
+
+    /// The other order, of which clause 2-2.1 says that the algorithm handles it as well.
+    #[test]
+    fn a_step_that_the_device_sees_first_is_held_until_the_controller_has_seen_it() {
         let rows = [
             (100, 100, 100, 100),
-            (100, 200, 100, 200),
-            (1100, 1300, 100, 300),
+            (100, 300, 1100, 1300),
+            (100, 350, 1100, 1350),
             (1100, 1400, 1100, 1400),
             (1100, 1500, 1100, 1500),
         ];
@@ -92,6 +140,63 @@ mod tests {
             compensation.update(Offsets { device, controller }, 500, 1000);
             assert_eq!(compensation.compensate(time_stamp), adjusted, "time stamp {time_stamp}");
         }
+    }
+
+    /// Clause 2-2.2: 1 us of correction in a millisecond, so that 100 us take 100 ms and 1 ms takes a Sync interval of a second,
+    /// whatever the update period.
+    #[test]
+    fn a_frequency_step_is_worked_off_at_a_microsecond_in_a_millisecond() {
+        for period in [500_000, 1_000_000, 2_000_000, 8_000_000_i64] {
+            for phase in [100_000, -100_000, 1_000_000, -1_000_000_i64] {
+                let mut compensation = OffsetCompensation::default();
+                compensation.update(Offsets::default(), 1_000_000, period);
+                let changed = Offsets { device: phase, controller: 0 };
+                compensation.update(changed, 1_000_000, period);
+                let left = |known: &OffsetCompensation| known.compensate(1 << 40).cast_signed() - (1 << 40);
+                assert_eq!(left(&compensation), phase, "no step of the stamps");
+                let mut passed = 0;
+                while left(&compensation) != 0 {
+                    let before = left(&compensation);
+                    compensation.update(changed, 1_000_000, period);
+                    passed += period;
+                    assert!((before - left(&compensation)).abs() <= period / 1000);
+                }
+                let whole = u64::try_from(period).expect("some ns");
+                assert_eq!(
+                    passed.unsigned_abs(),
+                    (phase.unsigned_abs() * 1000).next_multiple_of(whole),
+                    "{phase}"
+                );
+            }
+        }
+    }
+
+    /// What is not corrected yet is carried on (clause 2-2.2), whatever comes between. The listing of the clause loses it in two
+    /// cases: where offsets change in two updates in a row, and where a step of the master comes amid a correction.
+    #[test]
+    fn no_phase_is_lost_between_two_changes() {
+        let (threshold, period) = (1_000_000, 1_000_000);
+        let at =
+            |compensation: &OffsetCompensation| compensation.compensate(1 << 40).cast_signed() - (1 << 40);
+        // The controller learns of another master 900 us away, and the device does in the next update.
+        let mut compensation = OffsetCompensation::default();
+        compensation.update(Offsets::default(), threshold, period);
+        compensation.update(Offsets { device: 0, controller: 900_000 }, threshold, period);
+        assert_eq!(at(&compensation), -900_000);
+        compensation.update(Offsets { device: 900_000, controller: 900_000 }, threshold, period);
+        assert_eq!(at(&compensation), 0, "their clocks agree again");
+        // A step of 10 ms while 300 us are left of a change before.
+        let mut compensation = OffsetCompensation::default();
+        compensation.update(Offsets::default(), threshold, period);
+        compensation.update(Offsets { device: 301_000, controller: 0 }, threshold, period);
+        compensation.update(Offsets { device: 301_000, controller: 0 }, threshold, period);
+        assert_eq!(at(&compensation), 300_000);
+        compensation.update(Offsets { device: 301_000, controller: 10_000_000 }, threshold, period);
+        assert_eq!(at(&compensation), 300_000 - 10_000_000);
+        compensation.update(Offsets { device: 10_301_000, controller: 10_000_000 }, threshold, period);
+        assert_eq!(at(&compensation), 300_000, "as before the step");
+        compensation.update(Offsets { device: 10_301_000, controller: 10_000_000 }, threshold, period);
+        assert_eq!(at(&compensation), 299_000, "and it goes on");
     }
 
     #[test]
