@@ -361,7 +361,11 @@ impl Engine {
         };
         let wake = self.buses.iter().enumerate().filter_map(wake).min();
         let patience = self.buses.iter().map(South::patience).min().unwrap_or(IDLE_INTERVAL);
-        self.schedule.end(now, wake, patience)
+        let due = self.schedule.end(now, wake, patience);
+        // A controller that is faster than the buses gets its updates in between.
+        let period = self.devices.iter().filter_map(DeviceChannel::update_period).min();
+        let fast = period.filter(|period| *period < self.schedule.cycle_time);
+        fast.map_or(due, |period| due.min(now + DurationNs(period.as_nanos() / 2)))
     }
 
     fn run_buses(&mut self, now: MonotonicTime) {

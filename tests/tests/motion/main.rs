@@ -6,9 +6,14 @@
 mod chain;
 mod clocks;
 mod drive_faults;
+mod grandmaster;
+mod latency;
+mod long_run;
 mod modes;
+mod probe;
 mod round_trips;
 mod scenario;
 mod table;
+mod timing_model;
 mod updates;
 mod wake_ups;

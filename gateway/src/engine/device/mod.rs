@@ -18,7 +18,7 @@ use profile_cip::device::visualization::{self, Indication, NetworkCondition};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
 use profile_cip::wire::motion::codes::{NodeAlarm, NodeFault};
 use profile_cip::wire::status::GeneralStatus;
-use profile_generic::time::{MonotonicTime, SystemTime};
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeBase;
 
 pub use self::axis::CipAxis;
@@ -167,6 +167,12 @@ impl DeviceChannel {
     /// The engine's number of each axis with its state, in the order of the instances.
     pub fn axis_states(&self) -> impl Iterator<Item = (usize, AxisState)> + '_ {
         self.members.iter().map(|member| (member.axis, member.state))
+    }
+
+    /// The update period of the connected controller.
+    #[must_use]
+    pub fn update_period(&self) -> Option<DurationNs> {
+        self.device.connection().map(|connection| DurationNs::from_micros(i64::from(connection.rpi_us)))
     }
 
     /// What the Network Status LED of the device shows. The box tests nothing of itself before it speaks, has the address it

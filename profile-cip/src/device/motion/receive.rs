@@ -169,16 +169,18 @@ impl Engine {
         };
         connection.heard(sequence, now);
         connection.header = Some(header);
-        connection.received_at = system_time.map_or(0, |t| t.0);
+        // What is judged is when it came, not when somebody looked at it (class attribute 33).
+        let arrived = system_time.map(|system| system - now.since(arrival));
+        connection.received_at = arrived.map_or(0, |t| t.0);
         let paced_at = connection.stamps.arrive(arrival, lost);
         self.node_control(before, header.node_control);
         self.statistics.lost(lost);
         if u64::from(lost) > self.instances.high_limit() {
             self.node.raise(NodeFault::CONNECTION_UPDATE);
         }
-        let verdict = self.judge(now, (arrival, paced_at), system_time, &header);
+        let verdict = self.judge(now, (arrival, paced_at), system_time.zip(arrived), &header);
         match checked {
-            Checked::Variable(frame) => self.apply(now, system_time, frame, &verdict),
+            Checked::Variable(frame) => self.apply(now, (system_time, arrived), frame, &verdict),
             Checked::Fixed(command) => {
                 self.echo.clear();
                 self.echo.push(Echo { number: 1, cyclic: true, lists: None });
@@ -210,12 +212,13 @@ impl Engine {
         }
     }
 
-    /// Judges the age of an update and moves between asynchronous and synchronous operation.
+    /// Judges the age of an update and moves between asynchronous and synchronous operation. `system` is the system time of now, and
+    /// that of the arrival.
     fn judge(
         &mut self,
         now: MonotonicTime,
         (arrival, paced_at): (MonotonicTime, MonotonicTime),
-        system_time: Option<SystemTime>,
+        system: Option<(SystemTime, SystemTime)>,
         header: &CommandHeader,
     ) -> Verdict {
         let instances = &mut self.instances;
@@ -236,13 +239,15 @@ impl Engine {
             self.node.fresh_update();
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
         }
-        let (Some(received), Some(SystemTime(system_time))) = (header.time_stamp, system_time) else {
+        let (Some(received), Some((SystemTime(system_time), SystemTime(arrived)))) =
+            (header.time_stamp, system)
+        else {
             self.statistics.counters.untimed += 1;
             return Verdict::CommandsRefused;
         };
         let time_stamp = self.clock.compensate(received);
-        let age = connection.stamps.age(time_stamp, system_time, low, high);
-        let skewed = Clock::is_skewed(time_stamp, period, system_time);
+        let age = connection.stamps.age(time_stamp, arrived, low, high);
+        let skewed = Clock::is_skewed(time_stamp, period, arrived);
         if connection.schedule.mode == Mode::Asynchronous {
             connection.stamps.forget();
             self.node.fresh_update();
@@ -259,15 +264,15 @@ impl Engine {
             self.statistics.counters.stamp_jumps += 1;
             return Verdict::CommandsRefused;
         }
-        let cycle = i64::try_from(time_stamp.abs_diff(system_time)).unwrap_or(i64::MAX);
-        let cycle = if time_stamp >= system_time { cycle } else { -cycle };
+        let cycle = SystemTime(time_stamp).since(SystemTime(system_time)).as_nanos();
+        let ahead = SystemTime(time_stamp).since(SystemTime(arrived)).as_nanos();
         if age != Age::Alarming {
             self.node.fresh_update();
         }
         match age {
             // Served at its time, but one of the clocks is wrong: no update arrives before the start of its own period. What is
             // below the step threshold says nothing: the update may have come while this call was under way.
-            Age::OnTime if cycle > threshold => self.node.post(NodeAlarm::CLOCK_SKEW, now),
+            Age::OnTime if ahead > threshold => self.node.post(NodeAlarm::CLOCK_SKEW, now),
             Age::OnTime => {}
             Age::Late | Age::Alarming => {
                 self.statistics.late();
@@ -291,11 +296,11 @@ impl Engine {
         Verdict::Fresh(UpdateTimes { time_stamp: Some(time_stamp), period, paced_at })
     }
 
-    /// Distributes a checked update to class and axes.
+    /// Distributes a checked update to class and axes. The system times are those of now and of its arrival.
     fn apply(
         &mut self,
         now: MonotonicTime,
-        system_time: Option<SystemTime>,
+        (system_time, arrived): (Option<SystemTime>, Option<SystemTime>),
         frame: &CommandFrame<'_>,
         verdict: &Verdict,
     ) {
@@ -318,7 +323,7 @@ impl Engine {
                 }
             }
             if context.remote {
-                self.handle_service(&instance, system_time, verdict);
+                self.handle_service(&instance, arrived, verdict);
             }
             self.echo.push(echo);
         }
@@ -335,7 +340,7 @@ impl Engine {
     fn handle_service(
         &mut self,
         instance: &CommandInstance<'_>,
-        system_time: Option<SystemTime>,
+        arrived: Option<SystemTime>,
         verdict: &Verdict,
     ) {
         let number = usize::from(instance.number);
@@ -348,7 +353,7 @@ impl Engine {
                 channel.answer(GeneralStatus::DEVICE_STATE_CONFLICT, &[]);
                 return;
             }
-            service::execute(self, number, request, system_time);
+            service::execute(self, number, request, arrived);
         }
     }
 }

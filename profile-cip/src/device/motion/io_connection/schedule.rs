@@ -151,6 +151,13 @@ impl Schedule {
                 self.next = MonotonicTime(at.0.saturating_add(period));
                 first_update_id
             }
+            Mode::Synchronous => {
+                // Cycles that nobody asked for an update in keep their IDs, and the grid stays.
+                let left_out = now.0.saturating_sub(self.next.0) / period.max(1);
+                self.next = MonotonicTime(self.next.0.saturating_add(period.saturating_mul(left_out + 1)));
+                let [step, ..] = left_out.to_le_bytes();
+                self.sent_update_id.wrapping_add(step).wrapping_add(1)
+            }
             _ => {
                 let next = self.next.0.saturating_add(period);
                 // A schedule that has fallen behind starts anew instead of catching up in a burst.

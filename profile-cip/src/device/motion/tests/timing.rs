@@ -263,6 +263,59 @@ fn the_actual_update_window_is_that_of_figure_2_1_6() {
     );
 }
 
+/// A device that was not asked for some cycles: the next update has the ID of its own cycle, and the one behind it is on the grid.
+#[test]
+fn cycles_without_an_update_keep_their_ids() {
+    for periods in [1, 2, 5, 260] {
+        let mut rig = synchronous();
+        let send = |rig: &mut Rig| {
+            rig.now = rig.device.wake_at().expect("connected").0;
+            assert!(rig.run_device());
+            (rig.now, rig.header().update_id)
+        };
+        let (before, id) = send(&mut rig);
+        // The controller goes on, and so does its connection; its cycles begin behind the processing time.
+        for _ in 0..periods {
+            rig.now += PERIOD;
+            send_aged(&mut rig, -100_000);
+        }
+        rig.now = before + periods * PERIOD + PERIOD / 2;
+        assert!(rig.run_device());
+        let expected = id.wrapping_add(u8::try_from(periods % 256).expect("small"));
+        assert_eq!(rig.header().update_id, expected, "{periods}");
+        let (next, _) = send(&mut rig);
+        assert_eq!(next, before + (periods + 1) * PERIOD, "{periods}");
+        assert_eq!(rig.header().update_id, expected.wrapping_add(1));
+    }
+}
+
+/// An update that came in time and was looked at late is not late: class attribute 33 goes by the Data Received Time Stamp, which
+/// Time Diagnostics have as well.
+#[test]
+fn an_update_is_as_old_as_it_was_when_it_came() {
+    for (waited, late, applied) in
+        [(0, 0, true), (PERIOD / 2, 0, true), (3 * PERIOD, 0, true), (6 * PERIOD, 0, true)]
+    {
+        let mut rig = synchronous();
+        rig.time |= TimeDataSet::TIME_DIAGNOSTICS;
+        let counted = rig.device.counters().applied;
+        let stamp = EPOCH + rig.now;
+        rig.command_packet();
+        let mut header = rig.command_header();
+        header.time_stamp = Some(stamp);
+        let packet = rig.packet_with(&header);
+        let arrival = rig.now + PERIOD / 3;
+        rig.now = arrival + waited;
+        let (now, system) = (rig.now(), rig.system());
+        rig.device.handle_io_arrived(now, MonotonicTime(arrival), system, &packet);
+        let seen = (rig.device.counters().late_updates, rig.device.counters().applied - counted);
+        assert_eq!(seen, (late, u64::from(applied)), "{waited}");
+        assert!(rig.run_device());
+        let diagnostics = rig.header().time_diagnostics.expect("asked for");
+        assert_eq!(diagnostics.received_at, EPOCH + arrival);
+    }
+}
+
 /// Sends an update whose time stamp is `age` ns old; negative is ahead.
 fn send_aged(rig: &mut Rig, age: i64) {
     rig.command_packet();

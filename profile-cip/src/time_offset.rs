@@ -1,9 +1,10 @@
-//! System Time Offset Compensation, clause 2-2: makes the controller's time stamps comparable with the device's
-//! system time while a step of the master clock travels through the network.
+//! System Time Offset Compensation, clause 2-2: makes the time stamps of the other side comparable with the system time of this one
+//! while a step of the master clock travels through the network. Both roles have it: the device for the stamps of the
+//! controller (2-1.2), the controller for those of the device (2-1.3).
 //!
 //! ```text
 //! compensated = received + variance - phase correction
-//! variance    = (offset device - last) - (offset controller - last) [+ phase not yet corrected]
+//! variance    = (own offset - last) - (offset of the other side - last) [+ phase not yet corrected]
 //! ```
 //!
 //! Clause 2-2.1 adds the compensation, and its Table 2-2.2 shows -1000 for a controller that is 1000 ahead. When the
@@ -16,7 +17,7 @@
 
 /// State of the compensation. All values in ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct OffsetCompensation {
+pub(crate) struct OffsetCompensation {
     reference: Option<Offsets>,
     current: Offsets,
     /// Phase that is not corrected yet, of the time before the references.
@@ -28,11 +29,11 @@ pub struct OffsetCompensation {
 
 /// System time offsets of both sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Offsets {
-    /// System Time Offset of this device.
-    pub device: i64,
-    /// Controller Time Offset as received.
-    pub controller: i64,
+pub(crate) struct Offsets {
+    /// System Time Offset of this side.
+    pub own: i64,
+    /// The one that the other side has sent with its time stamps.
+    pub peer: i64,
 }
 
 impl OffsetCompensation {
@@ -49,9 +50,9 @@ impl OffsetCompensation {
         };
         if offsets != self.current {
             self.current = offsets;
-            let device = offsets.device.saturating_sub(reference.device);
-            let controller = offsets.controller.saturating_sub(reference.controller);
-            let variance = device.saturating_sub(controller).saturating_add(self.phase_remaining);
+            let own = offsets.own.saturating_sub(reference.own);
+            let peer = offsets.peer.saturating_sub(reference.peer);
+            let variance = own.saturating_sub(peer).saturating_add(self.phase_remaining);
             self.compensation = variance;
             self.step = variance.saturating_abs() > step_threshold;
             if !self.step {
@@ -65,7 +66,7 @@ impl OffsetCompensation {
         }
     }
 
-    /// A time stamp of the controller in this device's system time, ns.
+    /// A time stamp of the other side in the system time of this one, ns.
     #[must_use]
     pub fn compensate(&self, time_stamp: u64) -> u64 {
         time_stamp.saturating_add_signed(self.compensation)
@@ -111,9 +112,9 @@ mod tests {
                 "{interval}: whoever knows has the master's time"
             );
             if let Some(last) = compensation.reference {
-                assert_eq!((last.controller, last.device), (controller.last, drive.last), "{interval}");
+                assert_eq!((last.peer, last.own), (controller.last, drive.last), "{interval}");
             }
-            let offsets = Offsets { device: drive.offset, controller: controller.offset };
+            let offsets = Offsets { own: drive.offset, peer: controller.offset };
             compensation.update(offsets, 500, 1000);
             let found = compensation.compensate(time_stamp);
             assert_eq!(
@@ -137,7 +138,7 @@ mod tests {
         ];
         let mut compensation = OffsetCompensation::default();
         for (controller, time_stamp, device, adjusted) in rows {
-            compensation.update(Offsets { device, controller }, 500, 1000);
+            compensation.update(Offsets { own: device, peer: controller }, 500, 1000);
             assert_eq!(compensation.compensate(time_stamp), adjusted, "time stamp {time_stamp}");
         }
     }
@@ -150,7 +151,7 @@ mod tests {
             for phase in [100_000, -100_000, 1_000_000, -1_000_000_i64] {
                 let mut compensation = OffsetCompensation::default();
                 compensation.update(Offsets::default(), 1_000_000, period);
-                let changed = Offsets { device: phase, controller: 0 };
+                let changed = Offsets { own: phase, peer: 0 };
                 compensation.update(changed, 1_000_000, period);
                 let left = |known: &OffsetCompensation| known.compensate(1 << 40).cast_signed() - (1 << 40);
                 assert_eq!(left(&compensation), phase, "no step of the stamps");
@@ -181,21 +182,21 @@ mod tests {
         // The controller learns of another master 900 us away, and the device does in the next update.
         let mut compensation = OffsetCompensation::default();
         compensation.update(Offsets::default(), threshold, period);
-        compensation.update(Offsets { device: 0, controller: 900_000 }, threshold, period);
+        compensation.update(Offsets { own: 0, peer: 900_000 }, threshold, period);
         assert_eq!(at(&compensation), -900_000);
-        compensation.update(Offsets { device: 900_000, controller: 900_000 }, threshold, period);
+        compensation.update(Offsets { own: 900_000, peer: 900_000 }, threshold, period);
         assert_eq!(at(&compensation), 0, "their clocks agree again");
         // A step of 10 ms while 300 us are left of a change before.
         let mut compensation = OffsetCompensation::default();
         compensation.update(Offsets::default(), threshold, period);
-        compensation.update(Offsets { device: 301_000, controller: 0 }, threshold, period);
-        compensation.update(Offsets { device: 301_000, controller: 0 }, threshold, period);
+        compensation.update(Offsets { own: 301_000, peer: 0 }, threshold, period);
+        compensation.update(Offsets { own: 301_000, peer: 0 }, threshold, period);
         assert_eq!(at(&compensation), 300_000);
-        compensation.update(Offsets { device: 301_000, controller: 10_000_000 }, threshold, period);
+        compensation.update(Offsets { own: 301_000, peer: 10_000_000 }, threshold, period);
         assert_eq!(at(&compensation), 300_000 - 10_000_000);
-        compensation.update(Offsets { device: 10_301_000, controller: 10_000_000 }, threshold, period);
+        compensation.update(Offsets { own: 10_301_000, peer: 10_000_000 }, threshold, period);
         assert_eq!(at(&compensation), 300_000, "as before the step");
-        compensation.update(Offsets { device: 10_301_000, controller: 10_000_000 }, threshold, period);
+        compensation.update(Offsets { own: 10_301_000, peer: 10_000_000 }, threshold, period);
         assert_eq!(at(&compensation), 299_000, "and it goes on");
     }
 
@@ -203,8 +204,8 @@ mod tests {
     fn a_small_change_is_worked_off_a_thousandth_of_the_period_at_a_time() {
         let mut compensation = OffsetCompensation::default();
         let (threshold, period) = (1_000_000, 2_000_000);
-        compensation.update(Offsets { device: 0, controller: 0 }, threshold, period);
-        let changed = Offsets { device: 5_000, controller: 0 };
+        compensation.update(Offsets { own: 0, peer: 0 }, threshold, period);
+        let changed = Offsets { own: 5_000, peer: 0 };
         compensation.update(changed, threshold, period);
         assert_eq!(compensation.compensate(1_000_000), 1_005_000);
         for expected in [1_003_000, 1_001_000, 1_000_000, 1_000_000] {
@@ -218,18 +219,18 @@ mod tests {
         let mut compensation = OffsetCompensation::default();
         let (threshold, period) = (1_000_000, 1_000_000);
         compensation.update(Offsets::default(), threshold, period);
-        compensation.update(Offsets { device: -4_000, controller: 0 }, threshold, period);
-        compensation.update(Offsets { device: -4_000, controller: 0 }, threshold, period);
+        compensation.update(Offsets { own: -4_000, peer: 0 }, threshold, period);
+        compensation.update(Offsets { own: -4_000, peer: 0 }, threshold, period);
         assert_eq!(compensation.compensate(0x10_0000), 0x10_0000 - 3_000);
-        compensation.update(Offsets { device: -6_000, controller: 0 }, threshold, period);
+        compensation.update(Offsets { own: -6_000, peer: 0 }, threshold, period);
         assert_eq!(compensation.compensate(0x10_0000), 0x10_0000 - 5_000);
     }
 
     #[test]
     fn extreme_offsets_do_not_overflow() {
         let mut compensation = OffsetCompensation::default();
-        compensation.update(Offsets { device: i64::MIN, controller: i64::MAX }, 1, 1);
-        compensation.update(Offsets { device: i64::MAX, controller: i64::MIN }, 1, 1);
+        compensation.update(Offsets { own: i64::MIN, peer: i64::MAX }, 1, 1);
+        compensation.update(Offsets { own: i64::MAX, peer: i64::MIN }, 1, 1);
         assert_eq!(compensation.compensate(5), 5_u64.saturating_add_signed(i64::MAX));
     }
 }
