@@ -17,4 +17,5 @@ pub mod controller;
 pub mod device;
 pub mod devicenet;
 mod generated;
+mod time_offset;
 pub mod wire;

@@ -47,6 +47,8 @@ pub struct TimeBase {
     system: SystemTime,
     /// Rate with the slew in it, parts per thousand million.
     rate_ppb: i64,
+    /// Rate that the source knows, without the slew.
+    source_ppb: i64,
     /// System Time Offset: system time less local clock.
     offset: DurationNs,
     /// A difference beyond the threshold waits for a second sample: one alone may be a reading that was interrupted.
@@ -64,6 +66,7 @@ impl TimeBase {
             anchor: first.at,
             system: first.system,
             rate_ppb: 0,
+            source_ppb: 0,
             offset: DurationNs(offset),
             candidate: None,
             steps: 0,
@@ -87,6 +90,16 @@ impl TimeBase {
         self.anchor + elapsed - correction
     }
 
+    /// The instant of the monotonic clock at which something is due for this system time, some milliseconds from the last sample. A
+    /// slew that is under way is left out: it is over soon, and nobody knows when. So a target moves by what has been slewed
+    /// when it is converted; with the slew in it, the targets of the first update behind a change of rate would move by what
+    /// will be slewed until then as well, two to three times as much as in the ones that follow.
+    #[must_use]
+    pub fn target_at(&self, system: SystemTime) -> MonotonicTime {
+        let elapsed = system.since(self.system);
+        self.anchor + elapsed - drift(elapsed, self.source_ppb)
+    }
+
     /// System Time Offset (CIP Sync): system time less local clock. Changes with a step, never with a slew.
     #[must_use]
     pub const fn offset(&self) -> DurationNs {
@@ -107,8 +120,8 @@ impl TimeBase {
             self.candidate = None;
             (self.anchor, self.system) = (sample.at, expected);
             let slew = difference.0 * BILLION / SLEW_TIME.0;
-            let rate = sample.rate_ppb.clamp(-RATE_PPB_MAX, RATE_PPB_MAX);
-            self.rate_ppb = rate + slew.clamp(-SLEW_PPB, SLEW_PPB);
+            self.source_ppb = sample.rate_ppb.clamp(-RATE_PPB_MAX, RATE_PPB_MAX);
+            self.rate_ppb = self.source_ppb + slew.clamp(-SLEW_PPB, SLEW_PPB);
             return None;
         }
         let before = self.candidate.replace(difference)?;
@@ -176,6 +189,34 @@ mod tests {
         let left = sample(ms(500), 90_000).system.since(base.system_at(ms(500)));
         assert!(left.0.abs() < 1_000, "{left} is left after five time constants");
         assert_eq!((base.offset(), base.steps()), (offset, 0));
+    }
+
+    /// Targets two update periods of 8 ms ahead, while 90 us are slewed: none moves by more than a thousandth of the time between two
+    /// of them.
+    #[test]
+    fn targets_move_by_no_more_than_the_slew() {
+        for (later, ppb) in [(90_000, 0), (-90_000, 0), (90_000, 20_000), (-90_000, -200_000)] {
+            let mut base = begun();
+            let mut last = None;
+            for cycle in 0..500_u64 {
+                let gained = at_rate(ms(cycle), ppb);
+                let later = gained + if cycle > 100 { later } else { 0 };
+                base.feed(&TimeSample { rate_ppb: ppb, ..sample(ms(cycle), later) });
+                if !cycle.is_multiple_of(8) {
+                    continue;
+                }
+                let system = EPOCH + ms(cycle + 16).since(ms(0)) + DurationNs(at_rate(ms(cycle + 16), ppb));
+                let target = base.target_at(system);
+                if let Some(before) = last.replace(target) {
+                    let off = target.since(before) - DurationNs::from_millis(8);
+                    assert!(off.magnitude() <= 8_010, "{later} {ppb} {cycle}: {off}");
+                }
+            }
+        }
+    }
+
+    fn at_rate(at: MonotonicTime, ppb: i64) -> i64 {
+        at.since(ms(0)).0 * ppb / BILLION
     }
 
     #[test]
@@ -250,6 +291,7 @@ mod tests {
             for (at, system, rate_ppb) in samples {
                 base.feed(&TimeSample { at: MonotonicTime(at), system: SystemTime(system), rate_ppb });
                 let _ = (base.system_at(MonotonicTime(system)), base.monotonic_at(SystemTime(at)));
+                let _ = base.target_at(SystemTime(at));
             }
         }
     }

@@ -263,7 +263,7 @@ const BROKEN: &[(&str, &str, &str)] = &[
     (
         "update_period_below_cycle",
         "[device.identity]",
-        "update_period = { min = \"1 ms\" }\n[device.identity]",
+        "update_period = { min = \"400 us\" }\n[device.identity]",
     ),
     (
         "update_period_reversed",

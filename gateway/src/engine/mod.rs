@@ -265,8 +265,10 @@ impl Engine {
                 send(bus, port, (now.max(at), at), place, &mut self.schedule, &mut self.publication);
             }
         }
+        self.follow_time();
+        let next_call = self.end_call(now);
         for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
-            channel.transmit(now, &self.clock.base, &mut **port);
+            channel.transmit((now, next_call), &self.clock.base, &mut **port);
         }
         if self.ending.advance(now, self.clock.base.system_at(now), &mut self.axes) {
             self.buses.iter_mut().for_each(|bus| bus.stop(now));
@@ -277,8 +279,7 @@ impl Engine {
         let sources =
             Sources { stopping: ending.has_begun, buses, devices, axes, changes, locks: &self.locks };
         publication.publish(now, changed, &sources);
-        self.follow_time();
-        self.end_call(now)
+        next_call
     }
 
     /// Sends what was built ahead and whose instant has come. What could only go out much too late does not.
@@ -392,7 +393,11 @@ impl Engine {
         };
         let wake = self.buses.iter().enumerate().filter_map(wake).min();
         let patience = self.buses.iter().map(South::patience).min().unwrap_or(IDLE_INTERVAL);
-        self.schedule.end(now, wake, patience)
+        let due = self.schedule.end(now, wake, patience);
+        // A controller that is faster than the buses gets its updates in between.
+        let period = self.devices.iter().filter_map(DeviceChannel::update_period).min();
+        let fast = period.filter(|period| *period < self.schedule.cycle_time);
+        fast.map_or(due, |period| due.min(now + DurationNs(period.as_nanos() / 2)))
     }
 
     fn run_buses(&mut self, now: MonotonicTime) {

@@ -198,6 +198,39 @@ impl Default for TimeOuts {
     }
 }
 
+/// When in its update cycle the controller works and sends (clause 2-1.1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TimingModel {
+    /// The Controller Task runs at the start of each cycle and sends at once.
+    #[default]
+    Immediate,
+    /// The task runs a third of the period into the cycle and sends at once: what the device measured at the start of the cycle
+    /// counts in the command that it has at the end.
+    OneCycle,
+    /// The task runs half a period into the cycle and sends what the task before has planned.
+    TwoCycle,
+    /// The task runs at the start of the cycle and sends what the task before has planned.
+    ThreeCycle,
+}
+
+impl TimingModel {
+    /// From the start of an update cycle to the Controller Task.
+    #[must_use]
+    pub fn phase(self, period: DurationNs) -> DurationNs {
+        match self {
+            Self::Immediate | Self::ThreeCycle => DurationNs::ZERO,
+            Self::OneCycle => DurationNs(period.as_nanos() / 3),
+            Self::TwoCycle => DurationNs(period.as_nanos() / 2),
+        }
+    }
+
+    /// Whether a task plans for the next update cycle, and sends what was planned for this one.
+    #[must_use]
+    pub const fn plans_ahead(self) -> bool {
+        matches!(self, Self::TwoCycle | Self::ThreeCycle)
+    }
+}
+
 /// Everything about the device and the connection to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControllerConfig {
@@ -232,6 +265,8 @@ pub struct ControllerConfig {
     /// Update for which the commands are meant: in the variable format in synchronous operation, in the fixed one what
     /// Command Control (attribute 92) is set to.
     pub command_target: CommandTarget,
+    /// When the controller works and sends.
+    pub timing: TimingModel,
     /// D-to-C updates older than this many update periods count as late.
     pub update_delay_low_limit: u8,
     /// Consecutive update periods without a D-to-C update after which the controller gives up before the
@@ -273,6 +308,7 @@ impl ControllerConfig {
             t_to_o_port: None,
             grand_master,
             command_target: CommandTarget::INTERPOLATE,
+            timing: TimingModel::Immediate,
             update_delay_low_limit: 2,
             update_delay_high_limit: None,
             time_data: TimeDataSet::UPDATE_DIAGNOSTICS,

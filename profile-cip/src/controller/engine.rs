@@ -6,6 +6,7 @@ use core::net::SocketAddrV4;
 use std::collections::VecDeque;
 
 use super::axis::Axis;
+use super::clock::Clock;
 use super::config::{ConfigError, ControllerConfig};
 use super::event::Event;
 use super::executor::Executor;
@@ -19,7 +20,6 @@ use super::program::Step;
 use super::report::Report;
 use super::services::Services;
 use super::session::{Answer, Output, Session};
-use super::time_offset::TimeOffset;
 use super::update::Traffic;
 use crate::wire::Error;
 use crate::wire::motion::codes::{AxisControl, EventChecking};
@@ -57,7 +57,9 @@ pub struct Controller {
     pub(super) traffic: Traffic,
     pub(super) node: NodeSeen,
     pub(super) node_fault_reset: bool,
-    pub(super) offset: TimeOffset,
+    pub(super) clock: Clock,
+    /// The update cycle for which commands were planned ahead: its start.
+    pub(super) planned: Option<MonotonicTime>,
     /// System time at reception less the device's time stamp, of the last update that had one.
     pub(super) skew: Option<DurationNs>,
     pub(super) disabling: bool,
@@ -110,7 +112,8 @@ impl Controller {
             traffic: Traffic::default(),
             node: NodeSeen::default(),
             node_fault_reset: false,
-            offset: TimeOffset::default(),
+            clock: Clock::default(),
+            planned: None,
             skew: None,
             disabling: false,
             abuse: Abuse::default(),
@@ -265,8 +268,9 @@ impl Controller {
 
     /// A datagram that came to the I/O port.
     pub fn handle_datagram(&mut self, now: MonotonicTime, system_time: SystemTime, bytes: &[u8]) {
+        self.clock.feed(now, system_time);
         match self.link.receive(now, bytes) {
-            Ok(Some((arrival, update))) => self.handle_update(now, system_time, arrival, &update),
+            Ok(Some((arrival, update))) => self.handle_update(now, arrival, &update),
             Ok(None) => {}
             Err(error) => self.malformed(error),
         }
@@ -289,7 +293,8 @@ impl Controller {
             && self.link.is_open()
             && now >= due
         {
-            self.tick(now, system_time, due);
+            self.clock.feed(now, system_time);
+            self.tick(now, due);
             self.drain_session(now);
         }
     }
@@ -429,7 +434,8 @@ impl Controller {
         self.traffic = Traffic::default();
         self.node.reconnect();
         self.node_fault_reset = false;
-        self.offset = TimeOffset::default();
+        self.clock.reconnect();
+        self.planned = None;
         self.skew = None;
         self.abuse = Abuse::default();
         self.lost = None;

@@ -19,6 +19,7 @@
 mod axis;
 mod axis_set;
 mod carrier;
+mod clock;
 pub mod condition;
 pub mod config;
 mod cyclic_lists;
@@ -47,12 +48,11 @@ pub mod statistics;
 mod status;
 #[cfg(test)]
 mod tests;
-mod time_offset;
 pub mod trajectory;
 mod update;
 
 pub use condition::Condition;
-pub use config::{AttributeSet, AxisSetup, ControllerConfig, Scaling};
+pub use config::{AttributeSet, AxisSetup, ControllerConfig, Scaling, TimingModel};
 pub use engine::{Controller, StreamAction};
 pub use event::Event;
 pub use failure::Failure;

@@ -222,6 +222,7 @@ impl Controller {
             let limit = (self.config.period() * SKEW_PERIODS).magnitude();
             let skewed = self.skew.is_some_and(|skew| skew.magnitude() > limit);
             if status == SyncStatus::SYNCHRONIZED && !skewed {
+                self.clock.synchronize();
                 return self.configure_axis(1);
             }
             let last =

@@ -59,13 +59,7 @@ impl Traffic {
 }
 
 impl Controller {
-    pub(super) fn handle_update(
-        &mut self,
-        now: MonotonicTime,
-        system_time: SystemTime,
-        arrival: Arrival,
-        update: &Update<'_>,
-    ) {
+    pub(super) fn handle_update(&mut self, now: MonotonicTime, arrival: Arrival, update: &Update<'_>) {
         match arrival {
             Arrival::Fresh { lost } => {
                 self.report.updates += 1;
@@ -79,13 +73,13 @@ impl Controller {
         }
         self.traffic.handle_update(now, &mut self.report);
         match update {
-            Update::Variable(frame) => self.handle_variable(now, system_time, frame),
-            Update::Fixed(actual) => self.handle_fixed(system_time, actual),
+            Update::Variable(frame) => self.handle_variable(now, frame),
+            Update::Fixed(actual) => self.handle_fixed(now, actual),
         }
     }
 
     /// An update of the fixed format: no time stamp, and nothing about what the device received.
-    fn handle_fixed(&mut self, system_time: SystemTime, actual: &FixedActual) {
+    fn handle_fixed(&mut self, now: MonotonicTime, actual: &FixedActual) {
         self.node.status = actual.node_status;
         self.faults.handle(actual);
         if !actual.node_status.contains(NodeStatus::FAULT) {
@@ -95,7 +89,8 @@ impl Controller {
         if actual.node_status.contains(NodeStatus::DATA_VALID)
             && let Some(axis) = self.axes.first_mut()
         {
-            let time = UpdateTime { at: system_time, ahead: self.config.period() * 2 };
+            let at = self.clock.to_local(self.clock.system_at(now));
+            let time = UpdateTime { at, ahead: self.config.period() * 2 };
             let events = &mut self.events;
             axis.handle(&actual.block(), time, |event| push(events, event));
         }
@@ -137,24 +132,25 @@ impl Controller {
         }
     }
 
-    fn handle_variable(&mut self, now: MonotonicTime, system_time: SystemTime, frame: &ActualFrame<'_>) {
+    fn handle_variable(&mut self, now: MonotonicTime, frame: &ActualFrame<'_>) {
         let header = frame.header();
         let events = &mut self.events;
         self.node.handle(header, &mut self.report, |event| push(events, event));
         self.traffic.handle_received(now, header.last_received_id, &mut self.report);
-        self.offset.handle_received(header.last_received_id);
+        self.clock.handle_received(header.last_received_id);
         let synchronous = header.node_status.contains(NodeStatus::SYNC_MODE);
         // A device without time synchronization sends time stamps of zero.
         let stamp = header.time_stamp.filter(|stamp| *stamp != 0).map(SystemTime);
+        let period = self.config.period();
+        let stamp = stamp.map(|stamp| self.clock.compensate(stamp, header.time_offset, period));
+        let system_time = self.clock.system_at(now);
         self.skew = stamp.map(|stamp| system_time - stamp);
         let limit = self.config.period() * i64::from(self.config.update_delay_low_limit);
         if synchronous && self.skew.is_some_and(|skew| skew > limit) {
             self.report.late_updates += 1;
         }
-        let time = UpdateTime {
-            at: stamp.filter(|_| synchronous).unwrap_or(system_time),
-            ahead: self.config.period() * 2,
-        };
+        let at = self.clock.to_local(stamp.filter(|_| synchronous).unwrap_or(system_time));
+        let time = UpdateTime { at, ahead: period * 2 };
         for instance in frame.instances() {
             if let Some(response) = &instance.service {
                 self.services.handle(now, instance.number, response);
@@ -171,11 +167,12 @@ impl Controller {
         }
     }
 
-    pub(super) fn tick(&mut self, now: MonotonicTime, system_time: SystemTime, due: MonotonicTime) {
+    /// Runs the Controller Task that was due at `due`.
+    pub(super) fn tick(&mut self, now: MonotonicTime, due: MonotonicTime) {
         let period = self.config.period();
         let missed = (now - due).0 / period.0.max(1);
-        let tick = due + period * missed;
-        self.next_tick = Some(tick + period);
+        let task = due + period * missed;
+        self.next_tick = Some(task + period);
         self.report.missed_cycles += missed.unsigned_abs();
         if self.lost.is_none()
             && let Err(failure) = self.supervise(now)
@@ -188,24 +185,40 @@ impl Controller {
             self.lost = Some(failure);
             self.event(Event::ConnectionLost);
         }
+        // The time stamp is that of the start of the update cycle, however late this call is.
+        let start = task - self.config.timing.phase(period);
+        let ahead = self.config.timing.plans_ahead();
+        if !ahead {
+            self.run_task(now);
+        }
+        if !self.is_silent() {
+            if self.planned.take() != Some(start) {
+                self.plan(now, start);
+            }
+            if let Err(error) = self.send(now, start, 1 + missed) {
+                self.malformed(error);
+            }
+        }
+        if ahead {
+            self.run_task(now);
+            self.plan(now, start + period);
+            self.planned = Some(start + period);
+        }
+    }
+
+    /// What a Controller Task does beside planning: services and the program.
+    fn run_task(&mut self, now: MonotonicTime) {
         self.services.advance(now);
         self.read_faults(now);
         if let Err(failure) = self.advance(now) {
             self.fail(now, failure);
         }
         self.services.advance(now);
-        if !self.link.is_open() || self.lost.is_some() || self.abuse.vanished {
-            return;
-        }
-        // The time stamp is that of the start of the update period, however late this call is.
-        let stamp = system_time - (now - tick);
-        let periods = 1 + missed;
-        if let Err(failure) = self.plan(tick, stamp) {
-            self.fail(now, failure);
-        }
-        if let Err(error) = self.send(now, tick, stamp, periods) {
-            self.malformed(error);
-        }
+    }
+
+    /// Whether no update is sent.
+    fn is_silent(&self) -> bool {
+        !self.link.is_open() || self.lost.is_some() || self.abuse.vanished
     }
 
     /// Time-outs of the connection.
@@ -254,28 +267,26 @@ impl Controller {
         if self.is_timed() { self.config.command_target } else { CommandTarget::IMMEDIATE }
     }
 
-    /// Plans the commands of all axes.
-    fn plan(&mut self, tick: MonotonicTime, stamp: SystemTime) -> Result<(), Failure> {
-        if !self.is_configured() {
-            return Ok(());
+    /// Plans the commands of all axes for the update cycle that begins at `start`.
+    fn plan(&mut self, now: MonotonicTime, start: MonotonicTime) {
+        if !self.is_configured() || self.is_silent() {
+            return;
         }
         let synchronous = self.is_timed() && self.node.status.contains(NodeStatus::SYNC_MODE);
         let target = self.config.period() * i64::from(self.target().0);
+        let stamp = self.clock.to_local(self.clock.system_at(start));
         let applies_at = stamp + if synchronous { target } else { DurationNs::ZERO };
         let mut planned = Ok(());
         for axis in &mut self.axes {
-            planned = planned.and(axis.plan(tick + target, applies_at));
+            planned = planned.and(axis.plan(start + target, applies_at));
         }
-        planned
+        if let Err(failure) = planned {
+            self.fail(now, failure);
+        }
     }
 
-    fn send(
-        &mut self,
-        now: MonotonicTime,
-        tick: MonotonicTime,
-        stamp: SystemTime,
-        periods: i64,
-    ) -> Result<(), Error> {
+    /// Sends the update of the cycle that begins at `start`, so many periods after the one before.
+    fn send(&mut self, now: MonotonicTime, start: MonotonicTime, periods: i64) -> Result<(), Error> {
         let first = matches!(self.phase, Phase::FirstUpdate { .. });
         let (configured, timed, target) = (self.is_configured(), self.is_timed(), self.target());
         let spoil = self.abuse.next();
@@ -293,12 +304,8 @@ impl Controller {
         if self.config.format == Format::Fixed {
             return self.send_fixed(now, node_control, first, fresh, &spoil);
         }
-        let time_offset = if timed {
-            let offset = stamp.0.wrapping_sub(tick.0).cast_signed();
-            self.offset.measure(offset, update_id)
-        } else {
-            None
-        };
+        let stamp = self.clock.system_at(start);
+        let time_offset = if timed { self.clock.due(update_id) } else { None };
         let header = CommandHeader {
             update_id: update_id.wrapping_sub(spoil.update_id_back),
             node_control,

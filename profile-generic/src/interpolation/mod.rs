@@ -372,12 +372,22 @@ impl FineInterpolator {
 
     /// Puts the fine set-points for the instant `now` into a command; those that are not commanded become absent.
     pub fn write(&mut self, now: MonotonicTime, command: &mut AxisCommand) -> Quality {
+        self.write_ahead(now, DurationNs::ZERO, command)
+    }
+
+    /// The same for an instant that is still to come, by `ahead`: an update is not overdue for not being there before its time.
+    pub fn write_ahead(
+        &mut self,
+        now: MonotonicTime,
+        ahead: DurationNs,
+        command: &mut AxisCommand,
+    ) -> Quality {
         self.pass(now);
         let (Some(segment), Some(last_target)) = (self.segments.first(), self.last_target) else {
             command.take_set_points(&self.held);
             return if self.lost { Quality::Lost } else { Quality::Waiting };
         };
-        let overdue = self.overdue(last_target, now);
+        let overdue = self.overdue(last_target, now - ahead);
         if overdue > self.config.extrapolate_periods {
             segment.write(self.limit_time(segment, now), &mut self.held);
             // The position, and nothing that would move the axis on from there.

@@ -53,7 +53,6 @@ impl Attributes {
             attributes: attributes.collect(),
             power_structure_class_id: 1,
             supports_sync: true,
-            poll_interval_ns: 0,
             transmission_processing_ns: 100_000,
         };
         let device = MotionDevice::new(config).expect("a sound configuration");

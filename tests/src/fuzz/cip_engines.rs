@@ -79,7 +79,6 @@ impl Device {
             attributes: ATTRIBUTES.clone(),
             power_structure_class_id: 0,
             supports_sync: true,
-            poll_interval_ns: 0,
             transmission_processing_ns: 100_000,
         })
         .expect("a device");

@@ -22,6 +22,8 @@ pub struct Clock {
     system_offset: DurationNs,
     /// Its steps, each with the true instant.
     steps: Vec<(MonotonicTime, DurationNs)>,
+    /// When it began to follow another master last, in true time.
+    followed_at: Option<MonotonicTime>,
 }
 
 impl Default for Clock {
@@ -31,6 +33,7 @@ impl Default for Clock {
             since: (START, START),
             system_offset: DurationNs(i64::try_from(SYSTEM_OFFSET).unwrap_or(i64::MAX)),
             steps: Vec::new(),
+            followed_at: None,
         }
     }
 }
@@ -100,6 +103,22 @@ impl Clock {
         self.steps.push((now, by));
     }
 
+    /// A Sync of another master has come, as CIP Sync has it: from now on this clock has the system time and the rate of that one.
+    pub fn follow(&mut self, now: MonotonicTime, master: &Self) {
+        let by = master.system(now).since(self.system(now));
+        if by != DurationNs::ZERO {
+            self.step(now, by);
+        }
+        self.drift(now, master.drift_ppb);
+        self.followed_at = Some(now);
+    }
+
+    /// When it began to follow another master last, in true time.
+    #[must_use]
+    pub const fn followed_at(&self) -> Option<MonotonicTime> {
+        self.followed_at
+    }
+
     /// Lets it gain so many parts per billion from now on, or lose them: monotonic and system time alike.
     pub fn drift(&mut self, now: MonotonicTime, ppb: i64) {
         self.since = (now, self.monotonic(now));
@@ -137,6 +156,21 @@ mod tests {
         assert_eq!(clock.monotonic(later), later + MS * 2, "another drift is no step");
         clock.set_offset(later, DurationNs::ZERO);
         assert_eq!(clock.offset(later), DurationNs::ZERO);
+    }
+
+    #[test]
+    fn a_clock_that_follows_another_has_its_time_and_its_rate() {
+        let mut master = Clock::default();
+        let then = START + MS * 1_000;
+        master.step(then, MS * 10);
+        master.drift(then, 200_000);
+        let mut clock = Clock::default();
+        let now = START + MS * 2_000;
+        clock.follow(now, &master);
+        assert_eq!(clock.steps(), [(now, MS * 10 + DurationNs::from_micros(200))]);
+        let later = now + MS * 500;
+        assert_eq!((clock.system(later), clock.drift_ppb()), (master.system(later), 200_000));
+        assert_eq!(clock.monotonic(now), now, "the local clock does not step");
     }
 
     #[test]

@@ -88,10 +88,10 @@ pub const CONTROLLER: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 1);
 const CONTROLLER_PORT: u16 = 50_000;
 
 /// When the box is switched on.
-const START: MonotonicTime = MonotonicTime(1_000_000_000);
+pub const START: MonotonicTime = MonotonicTime(1_000_000_000);
 
 /// System time less monotonic time.
-const SYSTEM_OFFSET: u64 = 1_700_000_000_000_000_000;
+pub const SYSTEM_OFFSET: u64 = 1_700_000_000_000_000_000;
 
 /// Address of the box's Ethernet port.
 pub const HOST: Host = Host { mac: [0x02, 0x41, 0x42, 0, 0, 1], incarnation: 0x7A00 };

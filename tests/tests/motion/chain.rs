@@ -16,7 +16,7 @@ name = "motion"
 name = "front"
 listen = "10.0.0.2"
 axes = ["turntable"]
-update_period = { min = "CYCLE", max = "40 ms" }
+update_period = { min = "PERIOD", max = "40 ms" }
 
 [device.identity]
 vendor_id = 1
@@ -38,7 +38,7 @@ following_error = 0.5
 const SERCOS: &str = r#"
 [south.sercos]
 interface = "in-process"
-cycle_time = "2 ms"
+cycle_time = "CYCLE"
 jitter = "100 us"
 
 [[south.sercos.drive]]
@@ -49,7 +49,7 @@ address = 1
 const CANOPEN: &str = r#"
 [[south.can]]
 interface = "in-process"
-cycle_time = "4 ms"
+cycle_time = "CYCLE"
 
 [[south.can.drive]]
 name = "drive"
@@ -60,7 +60,7 @@ const DEVICENET: &str = r#"
 [[south.devicenet]]
 interface = "in-process"
 bit_rate = 500_000
-cycle_time = "10 ms"
+cycle_time = "CYCLE"
 mac_id = 1
 
 [[south.devicenet.drive]]
@@ -78,6 +78,44 @@ pub enum Bus {
     Canopen,
     /// 10 ms, two cycles in an update period.
     Devicenet,
+}
+
+impl Bus {
+    /// A rig with this bus at this cycle, whose device takes update periods from `least` on.
+    pub fn ready(self, cycle: DurationNs, least: DurationNs, limits: &str) -> Rig {
+        self.ready_with(cycle, least, limits, &[])
+    }
+
+    /// The same with some texts of its configuration replaced.
+    fn ready_with(
+        self,
+        cycle: DurationNs,
+        least: DurationNs,
+        limits: &str,
+        replaced: &[(&str, &str)],
+    ) -> Rig {
+        let (south, drives) = match self {
+            Self::Sercos => (SERCOS, vec![(1, UnitKind::Rotary)]),
+            Self::Canopen => (CANOPEN, Vec::new()),
+            Self::Devicenet => (DEVICENET, Vec::new()),
+        };
+        let micros = |span: DurationNs| format!("{} us", span.as_nanos() / 1_000);
+        let configuration = format!("{FRONT}{limits}{south}");
+        let configuration =
+            configuration.replace("CYCLE", &micros(cycle)).replace("PERIOD", &micros(least.min(cycle)));
+        let configuration = replaced.iter().fold(configuration, |text, (old, new)| text.replace(old, new));
+        Rig::ready(Settings { configuration, drives, ..Settings::default() })
+    }
+}
+
+impl fmt::Display for Bus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Sercos => "SERCOS",
+            Self::Canopen => "CANopen",
+            Self::Devicenet => "DeviceNet",
+        })
+    }
 }
 
 /// A bus and how the controller works with the gateway.
@@ -124,13 +162,22 @@ impl Chain {
 
     /// The same with more limits of the axis.
     pub fn ready_with(self, limits: &str) -> Rig {
-        let (south, cycle, drives) = match self.bus {
-            Bus::Sercos => (SERCOS, "2 ms", vec![(1, UnitKind::Rotary)]),
-            Bus::Canopen => (CANOPEN, "4 ms", Vec::new()),
-            Bus::Devicenet => (DEVICENET, "10 ms", Vec::new()),
-        };
-        let configuration = format!("{FRONT}{limits}{south}").replace("CYCLE", cycle);
-        Rig::ready(Settings { configuration, drives, ..Settings::default() })
+        self.bus.ready(self.cycle(), self.cycle(), limits)
+    }
+
+    /// A rig whose axis turns without end: its drive counts within a revolution.
+    pub fn endless(self) -> Rig {
+        let axis = "motion_resolution = 1_000_000";
+        let drive = "address = 1";
+        self.bus.ready_with(
+            self.cycle(),
+            self.cycle(),
+            "",
+            &[
+                (axis, &format!("{axis}\nunwind_counts = 1_000_000")),
+                (drive, &format!("{drive}\nset_scaling = true")),
+            ],
+        )
     }
 
     /// The controller's configuration.
@@ -146,11 +193,6 @@ impl Chain {
 
 impl fmt::Display for Chain {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let bus = match self.bus {
-            Bus::Sercos => "SERCOS",
-            Bus::Canopen => "CANopen",
-            Bus::Devicenet => "DeviceNet",
-        };
-        f.pad(&format!("{bus} {}", if self.synchronous { "sync" } else { "async" }))
+        f.pad(&format!("{} {}", self.bus, if self.synchronous { "sync" } else { "async" }))
     }
 }

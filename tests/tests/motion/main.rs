@@ -6,10 +6,15 @@
 mod chain;
 mod clocks;
 mod drive_faults;
+mod grandmaster;
+mod latency;
+mod long_run;
 mod modes;
 mod phase_lock;
+mod probe;
 mod round_trips;
 mod scenario;
 mod table;
+mod timing_model;
 mod updates;
 mod wake_ups;

@@ -12,6 +12,9 @@ use crate::finding::Spanned;
 use crate::finding::registry as code;
 
 const UPDATE_PERIOD_NS: RangeInclusive<i64> = 250_000..=100_000_000;
+/// Updates of the controller in a cycle of the bus at most. All but the last of a cycle change nothing (CIP Volume 9, table
+/// 6-2.25: below a half, command data is to be applied immediately).
+const UPDATES_PER_CYCLE_MAX: i64 = 4;
 const DEFAULT_UPDATE_PERIOD_MIN: DurationNs = DurationNs::from_millis(1);
 const DEFAULT_UPDATE_PERIOD_MAX: DurationNs = DurationNs::from_millis(32);
 const DEFAULT_REVISION: (u8, u8) = (1, 1);
@@ -107,14 +110,18 @@ fn update_period(
         Some(text) => one_update_period(problems, text)?,
         None => DEFAULT_UPDATE_PERIOD_MAX.max(cycle_time),
     };
+    let least = DurationNs(cycle_time.as_nanos() / UPDATES_PER_CYCLE_MAX);
     if let Some(text) = given_min
-        && min < cycle_time
+        && min < least
     {
         return problems.report_as(
             code::CONTRADICTION,
             text.span(),
-            format_args!("the shortest update period {} is shorter than the bus cycle", duration::show(min)),
-            format_args!("expected at least {}", duration::show(cycle_time)),
+            format_args!(
+                "the shortest update period {} is shorter than a quarter of the bus cycle",
+                duration::show(min)
+            ),
+            format_args!("expected at least {}", duration::show(least)),
         );
     }
     match given_max.or(given_min) {
@@ -192,7 +199,10 @@ mod tests {
     fn update_periods_fit_each_other_and_the_bus() {
         for (period, title) in [
             ("{ min = \"2.5 us\" }", "2500 ns cannot be an update period"),
-            ("{ min = \"1 ms\" }", "the shortest update period 1 ms is shorter than the bus cycle"),
+            (
+                "{ min = \"499 us\" }",
+                "the shortest update period 499 us is shorter than a quarter of the bus cycle",
+            ),
             (
                 "{ min = \"4 ms\", max = \"3 ms\" }",
                 "the shortest update period 4 ms is longer than the longest 3 ms",

@@ -259,7 +259,7 @@ impl SetPoints {
     pub fn write(&mut self, counts: bool, command: &mut AxisCommand) -> Option<Quality> {
         let interpolator = self.interpolator.as_mut()?;
         if counts && self.sequence.is_some() {
-            return Some(interpolator.write(self.acts_at, command));
+            return Some(interpolator.write_ahead(self.acts_at, self.ahead, command));
         }
         interpolator.pass(self.acts_at);
         None

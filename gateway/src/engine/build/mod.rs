@@ -23,6 +23,7 @@ use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
+use profile_generic::time::DurationNs;
 
 use super::axis::{AxisChannel, HookupSettings, Limits};
 use super::bus::can::failure::Misfit;
@@ -44,8 +45,10 @@ const NOTICES_MIN: usize = 16 * NOTICES_OF_AXIS;
 /// Largest connection sizes that a device takes, with the sequence count.
 const CONNECTION_SIZE_MAX: u16 = 1400;
 
-/// What a device needs from the start of a D-to-C update to its transmission.
-const TRANSMISSION_PROCESSING_NS: u64 = 100_000;
+/// What a device needs from the start of a D-to-C update to its transmission, behind the step of a bus that begins `lead` before an
+/// instant of the grid. With a bus that is locked to the controller, that step is as near to the start of the update cycle: an
+/// update that waited for it would come too late as often as the cycle thread does.
+const TRANSMISSION_PROCESSING: DurationNs = DurationNs::from_micros(50);
 
 /// The whole of a box but its sockets and threads.
 #[derive(Debug)]
@@ -150,7 +153,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         let number = u8::try_from(number).unwrap_or(u8::MAX);
         let channel = DeviceChannel::new(
             number,
-            device_config(device, &members, &mapping, config.cycle_time()),
+            device_config(device, &members, &mapping, config.lead),
             device_end,
             configs,
             &mapping,
@@ -312,7 +315,7 @@ fn device_config(
     device: &Device,
     members: &[(usize, &Axis)],
     mapping: &Mapping,
-    bus_cycle: profile_generic::time::DurationNs,
+    lead: DurationNs,
 ) -> DeviceConfig {
     let axis = |(_, axis): &(usize, &Axis)| AxisConfig {
         kind: match axis.function {
@@ -334,8 +337,7 @@ fn device_config(
         power_structure_class_id: device.power_structure_class_id,
         // Updates of the fixed format have no time stamps.
         supports_sync: device.connection_format == Format::Variable,
-        poll_interval_ns: u64::try_from(bus_cycle.as_nanos()).unwrap_or(0),
-        transmission_processing_ns: TRANSMISSION_PROCESSING_NS,
+        transmission_processing_ns: (lead + TRANSMISSION_PROCESSING).magnitude(),
     }
 }
 

@@ -205,7 +205,7 @@ impl Member {
             Command::Follow(points) => points.target_time.map(SystemTime),
             Command::Withheld(_) => None,
         };
-        self.cip.command(axis, (now, system), &image, target.map(|at| time.monotonic_at(at)));
+        self.cip.command(axis, (now, system), &image, target.map(|at| time.target_at(at)));
     }
 
     /// Follows the state of the axis in the motion device. The scaling counts from the end of Initializing on.

@@ -170,6 +170,12 @@ impl DeviceChannel {
         self.members.iter().map(|member| (member.axis, member.state))
     }
 
+    /// The update period of the connected controller.
+    #[must_use]
+    pub fn update_period(&self) -> Option<DurationNs> {
+        self.device.connection().map(|connection| DurationNs::from_micros(i64::from(connection.rpi_us)))
+    }
+
     /// What the Network Status LED of the device shows. The box tests nothing of itself before it speaks, has the address it
     /// listens at, and does not look for another station with it.
     #[must_use]
@@ -313,9 +319,15 @@ impl DeviceChannel {
         true
     }
 
-    /// Sends what is due on the I/O connection, and answers the explicit side.
-    pub fn transmit(&mut self, now: MonotonicTime, time: &TimeBase, port: &mut dyn NorthPort) {
+    /// Sends what is due on the I/O connection before `next_call`, when this is called again, and answers the explicit side.
+    pub fn transmit(
+        &mut self,
+        (now, next_call): (MonotonicTime, MonotonicTime),
+        time: &TimeBase,
+        port: &mut dyn NorthPort,
+    ) {
         let system = time.system_at(now);
+        self.device.expect_poll(next_call);
         let Self { buffer, .. } = self;
         let data = CLASS1_HEADER_LEN - SEQUENCE_COUNT_LEN;
         if let Some(length) = self.device.poll_transmit(now, Some(system), &mut buffer[data..])

@@ -216,7 +216,6 @@ fn device(format: Format, axes: usize) -> MotionDevice {
         ],
         power_structure_class_id: 0x0A0B_0C0D,
         supports_sync: format == Format::Variable,
-        poll_interval_ns: 0,
         transmission_processing_ns: 200_000,
     })
     .unwrap()

@@ -1,8 +1,8 @@
 //! System time of the device and the controller's time stamps in it.
 
-use super::time_offset::{OffsetCompensation, Offsets};
 use crate::device::axis::reported::Reported;
 use crate::device::motion_link::SyncState;
+use crate::time_offset::{OffsetCompensation, Offsets};
 use crate::wire::motion::codes::SyncStatus;
 use crate::wire::motion::id_list::parse_group_sync;
 use crate::wire::status::GeneralStatus;
@@ -45,7 +45,7 @@ impl Clock {
     }
 
     fn offsets(&self, controller: u64) -> Offsets {
-        Offsets { device: self.sync.offset, controller: controller.cast_signed() }
+        Offsets { own: self.sync.offset, peer: controller.cast_signed() }
     }
 
     /// A time-stamped update has come. `controller` is the Controller Time Offset, `period` the update period, both in ns.

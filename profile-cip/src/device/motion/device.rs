@@ -60,10 +60,6 @@ pub struct DeviceConfig {
     pub power_structure_class_id: u32,
     /// Whether the device has a synchronized system time (CIP Sync).
     pub supports_sync: bool,
-    /// How far apart the calls of [`MotionDevice::poll_transmit`] are, ns. In synchronous operation an update goes with
-    /// the call that is nearest to its time: with periods of the same length, half of the updates would otherwise miss
-    /// theirs by a hair and come a whole call late. 0: no update goes before its time.
-    pub poll_interval_ns: u64,
     /// Time to produce a D-to-C update before its cycle starts, ns (Transmission Processing Time, clause 7-1.3).
     pub transmission_processing_ns: u64,
 }
@@ -457,6 +453,15 @@ impl MotionDevice {
     /// octets of the fixed format, or an update of the variable one. The Update ID alone tells what is new.
     pub fn handle_unsequenced(&mut self, now: MonotonicTime, system_time: Option<SystemTime>, update: &[u8]) {
         self.engine.handle_unsequenced(now, system_time, update);
+    }
+
+    /// Says when [`MotionDevice::poll_transmit`] is called next, behind the call that is to come: in synchronous operation an
+    /// update goes with the last call that is not too late for it (Actual Update Window, clause 2-1.3). Without this it goes
+    /// with the first call at [`MotionDevice::wake_at`] or behind.
+    pub fn expect_poll(&mut self, next_call: MonotonicTime) {
+        if let Some(connection) = &mut self.engine.connection {
+            connection.schedule.expect(next_call);
+        }
     }
 
     /// If a D-to-C update is due at `now`, writes its data (class-1 sequence count and update) and returns the octets.

@@ -101,7 +101,7 @@ impl Engine {
         if parameters.rpi_us == 0 || parameters.timeout_us == 0 {
             return refuse(INTERVAL_NOT_ACCEPTABLE);
         }
-        self.connection = Some(IoConnection::new(parameters, self.config.poll_interval_ns, now));
+        self.connection = Some(IoConnection::new(parameters, self.config.transmission_processing_ns, now));
         self.start_over();
         let system_time = system_time.map_or(0, |t| t.0);
         self.instances.slots.iter_mut().for_each(|slot| slot.axis.open(system_time));

@@ -19,5 +19,4 @@ mod slot;
 mod statistics;
 #[cfg(test)]
 mod tests;
-mod time_offset;
 mod transmit;

@@ -169,16 +169,18 @@ impl Engine {
         };
         connection.heard(sequence, now);
         connection.header = Some(header);
-        connection.received_at = system_time.map_or(0, |t| t.0);
+        // What is judged is when it came, not when somebody looked at it (class attribute 33).
+        let arrived = system_time.map(|system| system - now.since(arrival));
+        connection.received_at = arrived.map_or(0, |t| t.0);
         let paced_at = connection.stamps.arrive(arrival, lost);
         self.node_control(before, header.node_control);
         self.statistics.lost(lost);
         if u64::from(lost) > self.instances.high_limit() {
             self.node.raise(NodeFault::CONNECTION_UPDATE);
         }
-        let verdict = self.judge(now, (arrival, paced_at), system_time, &header);
+        let verdict = self.judge(now, (arrival, paced_at), system_time.zip(arrived), &header);
         match checked {
-            Checked::Variable(frame) => self.apply(now, system_time, frame, &verdict),
+            Checked::Variable(frame) => self.apply(now, (system_time, arrived), frame, &verdict),
             Checked::Fixed(command) => {
                 self.echo.clear();
                 self.echo.push(Echo { number: 1, cyclic: true, lists: None });
@@ -190,10 +192,7 @@ impl Engine {
             }
         }
         let fresh = matches!(verdict, Verdict::Fresh(_));
-        if fresh {
-            self.statistics.counters.applied += 1;
-            self.node.fresh_update();
-        }
+        self.statistics.counters.applied += u64::from(fresh);
         if let Some(connection) = &mut self.connection {
             connection.answer(header.update_id, now);
             connection.accepted(header.update_id, now, fresh);
@@ -213,12 +212,13 @@ impl Engine {
         }
     }
 
-    /// Judges the age of an update and moves between asynchronous and synchronous operation.
+    /// Judges the age of an update and moves between asynchronous and synchronous operation. `system` is the system time of now, and
+    /// that of the arrival.
     fn judge(
         &mut self,
         now: MonotonicTime,
         (arrival, paced_at): (MonotonicTime, MonotonicTime),
-        system_time: Option<SystemTime>,
+        system: Option<(SystemTime, SystemTime)>,
         header: &CommandHeader,
     ) -> Verdict {
         let instances = &mut self.instances;
@@ -236,23 +236,25 @@ impl Engine {
             self.config.supports_sync && header.node_control.contains(NodeControl::SYNC_CONTROL);
         if !synchronous {
             connection.stamps.forget();
+            self.node.fresh_update();
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
         }
-        let (Some(received), Some(SystemTime(system_time))) = (header.time_stamp, system_time) else {
+        let (Some(received), Some((SystemTime(system_time), SystemTime(arrived)))) =
+            (header.time_stamp, system)
+        else {
             self.statistics.counters.untimed += 1;
             return Verdict::CommandsRefused;
         };
         let time_stamp = self.clock.compensate(received);
-        let age = connection.stamps.age(time_stamp, system_time, low, high);
-        let skewed = Clock::is_skewed(time_stamp, period, system_time);
+        let age = connection.stamps.age(time_stamp, arrived, low, high);
+        let skewed = Clock::is_skewed(time_stamp, period, arrived);
         if connection.schedule.mode == Mode::Asynchronous {
             connection.stamps.forget();
+            self.node.fresh_update();
             self.node.skew(skewed, now);
             if !skewed && self.clock.is_synchronized() {
                 let start = time_stamp.saturating_add(period.saturating_mul(2));
-                let in_ns =
-                    start.saturating_sub(system_time).saturating_sub(self.config.transmission_processing_ns);
-                connection.schedule.synchronize(header.update_id, in_ns, now);
+                connection.schedule.synchronize(header.update_id, start.saturating_sub(system_time), now);
             }
             // Until the clocks are proven the device goes on asynchronously, without trust in the time stamp.
             return Verdict::Fresh(UpdateTimes { time_stamp: None, period, paced_at });
@@ -262,13 +264,15 @@ impl Engine {
             self.statistics.counters.stamp_jumps += 1;
             return Verdict::CommandsRefused;
         }
-        let cycle = i64::try_from(time_stamp.abs_diff(system_time)).unwrap_or(i64::MAX);
-        let cycle = if time_stamp >= system_time { cycle } else { -cycle };
-        let processing = i64::try_from(self.config.transmission_processing_ns).unwrap_or(0);
+        let cycle = SystemTime(time_stamp).since(SystemTime(system_time)).as_nanos();
+        let ahead = SystemTime(time_stamp).since(SystemTime(arrived)).as_nanos();
+        if age != Age::Alarming {
+            self.node.fresh_update();
+        }
         match age {
             // Served at its time, but one of the clocks is wrong: no update arrives before the start of its own period. What is
             // below the step threshold says nothing: the update may have come while this call was under way.
-            Age::OnTime if cycle > threshold => self.node.post(NodeAlarm::CLOCK_SKEW, now),
+            Age::OnTime if ahead > threshold => self.node.post(NodeAlarm::CLOCK_SKEW, now),
             Age::OnTime => {}
             Age::Late | Age::Alarming => {
                 self.statistics.late();
@@ -288,16 +292,16 @@ impl Engine {
                 return Verdict::CommandsRefused;
             }
         }
-        connection.schedule.align(cycle.saturating_sub(processing), now);
+        connection.schedule.align(cycle, now);
         connection.stamped_at = Some(time_stamp);
         Verdict::Fresh(UpdateTimes { time_stamp: Some(time_stamp), period, paced_at })
     }
 
-    /// Distributes a checked update to class and axes.
+    /// Distributes a checked update to class and axes. The system times are those of now and of its arrival.
     fn apply(
         &mut self,
         now: MonotonicTime,
-        system_time: Option<SystemTime>,
+        (system_time, arrived): (Option<SystemTime>, Option<SystemTime>),
         frame: &CommandFrame<'_>,
         verdict: &Verdict,
     ) {
@@ -320,7 +324,7 @@ impl Engine {
                 }
             }
             if context.remote {
-                self.handle_service(&instance, system_time, verdict);
+                self.handle_service(&instance, arrived, verdict);
             }
             self.echo.push(echo);
         }
@@ -337,7 +341,7 @@ impl Engine {
     fn handle_service(
         &mut self,
         instance: &CommandInstance<'_>,
-        system_time: Option<SystemTime>,
+        arrived: Option<SystemTime>,
         verdict: &Verdict,
     ) {
         let number = usize::from(instance.number);
@@ -350,7 +354,7 @@ impl Engine {
                 channel.answer(GeneralStatus::DEVICE_STATE_CONFLICT, &[]);
                 return;
             }
-            service::execute(self, number, request, system_time);
+            service::execute(self, number, request, arrived);
         }
     }
 }

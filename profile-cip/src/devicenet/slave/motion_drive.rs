@@ -135,7 +135,6 @@ fn device(config: &MotionDriveConfig) -> Result<MotionDevice, DeviceError> {
         attributes: config.attributes.clone(),
         power_structure_class_id: 0,
         supports_sync: false,
-        poll_interval_ns: 0,
         transmission_processing_ns: 0,
     })
 }

@@ -49,6 +49,7 @@ use self::known::{Known, OPEN};
 use self::reading::{Reading, Scaling};
 use self::statistics::Statistics;
 use self::violation::{BusKind, Circumstances, Violation};
+use super::clocks::Clock;
 use super::updates::{AxisCommanded, Commanded};
 use super::{Rig, START};
 
@@ -57,6 +58,11 @@ const CALLS_MAX: usize = 256;
 
 /// How long set-points may depend on updates of before the end of a drift: those of a controller that is ahead wait for their time.
 const DRIFT_LASTS: DurationNs = DurationNs::from_millis(100);
+
+/// How long after a Sync of another master a phase of up to a millisecond may be corrected, and how fast: a microsecond in a
+/// millisecond (CIP Volume 9, 2-2.2).
+const CORRECTION_LASTS: DurationNs = DurationNs::from_millis(1_500);
+const CORRECTION: f64 = 1e-3;
 
 /// Cycles in which the lateness of the engine still shows in a set-point: it moves the change before and behind it, and the
 /// ones that a curve is bent by.
@@ -312,14 +318,20 @@ impl MotionChecker {
     pub(super) fn observe(&mut self, rig: &Rig) {
         let apart = (rig.controller_clock.drift_ppb() - rig.gateway_clock.drift_ppb()).abs();
         let pull = self.axes.iter().map(|axis| axis.grid.pull()).fold(0.0, f64::max);
-        let drift = pull.max(f64_from_i64(apart) / 1e9);
+        let rates = f64_from_i64(apart) / 1e9;
+        let drift = rates + pull;
         if drift >= self.drifted.1 || rig.now().since(self.drifted.0) > DRIFT_LASTS {
             self.drifted = (rig.now(), drift);
         }
+        let followed = [&rig.controller_clock, &rig.gateway_clock].map(Clock::followed_at);
+        let corrects = followed.into_iter().flatten().any(|at| rig.now().since(at) <= CORRECTION_LASTS);
+        let correction = if corrects { CORRECTION } else { 0.0 };
+        let offset = rig.controller_clock.offset(rig.now()) - rig.gateway_clock.offset(rig.now());
         let skew = Skew {
             synchronous: rig.engine.devices()[0].device().is_synchronous(),
-            offset: rig.controller_clock.offset(rig.now()) - rig.gateway_clock.offset(rig.now()),
-            drift: self.drifted.1,
+            // The time of another master is on its way to one of them: their stamps are compensated.
+            offset: if corrects { DurationNs::ZERO } else { offset },
+            drift: self.drifted.1 + correction,
         };
         let steps = rig.controller_clock.steps().iter().chain(rig.gateway_clock.steps());
         let stepped = steps.into_iter().any(|(at, _)| *at >= self.connected_at);
@@ -342,7 +354,8 @@ impl MotionChecker {
             let cycle = axis.grid.sent(sent, late > DurationNs::ZERO);
             let leader =
                 call.and_then(|call| call.leaders.get(axis.number)).copied().unwrap_or(Leader::Other);
-            let skew = Skew { drift: skew.drift.max(axis.grid.pull()), ..skew };
+            // The pull of this very cycle.
+            let skew = Skew { drift: skew.drift.max(rates + axis.grid.pull() + correction), ..skew };
             let instant = Instant {
                 at: call.map_or(sent, |call| call.at),
                 cycle,

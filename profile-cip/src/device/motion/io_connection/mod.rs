@@ -63,8 +63,8 @@ pub(crate) struct IoConnection {
 }
 
 impl IoConnection {
-    /// An open connection that is asked for its updates every `poll_interval_ns`.
-    pub fn new(parameters: OpenParameters, poll_interval_ns: u64, now: MonotonicTime) -> Self {
+    /// An open connection whose device needs `processing_ns` to produce an update (Transmission Processing Time).
+    pub fn new(parameters: OpenParameters, processing_ns: u64, now: MonotonicTime) -> Self {
         let period = u64::from(parameters.rpi_us).saturating_mul(1000);
         Self {
             parameters,
@@ -77,7 +77,7 @@ impl IoConnection {
             received_at: 0,
             stamped_at: None,
             stamps: Stamps::new(period),
-            schedule: Schedule::new(period, poll_interval_ns / 2, now),
+            schedule: Schedule::new(period, processing_ns, now),
         }
     }
 

@@ -36,7 +36,6 @@ fn config() -> DeviceConfig {
         attributes: definitions(),
         power_structure_class_id: 0,
         supports_sync: false,
-        poll_interval_ns: 0,
         transmission_processing_ns: 0,
     }
 }

@@ -121,6 +121,8 @@ pub(crate) struct Rig {
     /// The last D-to-C packet.
     pub packet: Vec<u8>,
     pub t_to_o_size: u16,
+    /// Controller Update Period of the connections to come, ns.
+    pub period: u64,
     token: u64,
 }
 
@@ -159,11 +161,11 @@ impl Rig {
 
     /// A device with these attributes.
     pub fn with(attributes: Vec<AttributeDefinition>) -> Self {
-        Self::polled_every(0, attributes)
+        Self::processing(100_000, attributes)
     }
 
-    /// A device with these attributes that is asked for updates at this interval, ns.
-    pub fn polled_every(poll_interval_ns: u64, attributes: Vec<AttributeDefinition>) -> Self {
+    /// A device with these attributes and this Transmission Processing Time, ns.
+    pub fn processing(transmission_processing_ns: u64, attributes: Vec<AttributeDefinition>) -> Self {
         let axis = AxisConfig {
             kind: ControlKind::Active,
             control_modes: 1 << ControlMode::POSITION.0 | 1 << ControlMode::VELOCITY.0,
@@ -177,8 +179,7 @@ impl Rig {
             attributes,
             power_structure_class_id: 0x1234,
             supports_sync: true,
-            poll_interval_ns,
-            transmission_processing_ns: 100_000,
+            transmission_processing_ns,
         };
         let mut device = MotionDevice::new(config).expect("a device");
         device.set_sync(SyncState { grandmaster: Some(GRANDMASTER), synchronized: true, offset: 0 });
@@ -202,6 +203,7 @@ impl Rig {
             drives: vec![FakeDrive::new(); 2],
             packet: Vec::new(),
             t_to_o_size: 500,
+            period: PERIOD,
             token: 0,
         }
     }
@@ -223,8 +225,8 @@ impl Rig {
             t_to_o_id: 12,
             originator: Ipv4Addr::LOCALHOST,
             t_to_o_destination: SocketAddrV4::new(Ipv4Addr::LOCALHOST, 2222),
-            rpi_us: u32::try_from(PERIOD / 1000).expect("fits"),
-            timeout_us: 16 * PERIOD / 1000,
+            rpi_us: u32::try_from(self.period / 1000).expect("fits"),
+            timeout_us: 16 * self.period / 1000,
             o_to_t_size: 500,
             t_to_o_size: self.t_to_o_size,
             o_to_t_variable: true,
@@ -330,7 +332,7 @@ impl Rig {
         let packet = self.command_packet();
         self.send(&packet);
         self.run_device();
-        self.now += PERIOD;
+        self.now += self.period;
     }
 
     pub fn cycles(&mut self, count: usize) {
@@ -342,7 +344,7 @@ impl Rig {
     /// One update period in which nothing comes from the controller.
     pub fn silence(&mut self) {
         self.run_device();
-        self.now += PERIOD;
+        self.now += self.period;
     }
 
     pub fn frame(&self) -> ActualFrame<'_> {

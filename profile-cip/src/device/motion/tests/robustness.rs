@@ -153,7 +153,6 @@ fn a_feedback_axis_runs_without_being_enabled_and_never_energizes() {
         attributes: Vec::new(),
         power_structure_class_id: 0,
         supports_sync: false,
-        poll_interval_ns: 0,
         transmission_processing_ns: 0,
     };
     rig.device = MotionDevice::new(config).expect("a device");
