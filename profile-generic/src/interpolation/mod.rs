@@ -198,6 +198,8 @@ pub struct FineInterpolator {
     lost: bool,
     /// The motion that the next update goes on from, and when it was so.
     carried: Option<(MonotonicTime, Motion)>,
+    /// How far ahead set-points are made.
+    ahead: DurationNs,
 }
 
 impl FineInterpolator {
@@ -217,6 +219,7 @@ impl FineInterpolator {
             held: AxisCommand::default(),
             lost: false,
             carried: None,
+            ahead: DurationNs::ZERO,
         })
     }
 
@@ -335,8 +338,10 @@ impl FineInterpolator {
                 channels.3.fill(Some(past.torque.get()));
             }
         } else if let Some(segment) = self.segments.last() {
+            // Until this one leads, from a period before its target on, the motion goes on as it is.
+            let until = self.config.period * i64::from(self.config.target_update.periods().saturating_sub(1));
             for missing in (1..periods).rev() {
-                let at = self.limit_time(segment, target - length * missing);
+                let at = self.limit_time(segment, target - length * missing - until) + until;
                 let place = segment.place(at);
                 channels.0.lose(segment.position.map(|curve| segment.motion(&curve, &place, at).0));
                 channels.1.lose(segment.velocity.map(|curve| curve.value(&place)));
@@ -382,6 +387,7 @@ impl FineInterpolator {
         ahead: DurationNs,
         command: &mut AxisCommand,
     ) -> Quality {
+        self.ahead = ahead;
         self.pass(now);
         let (Some(segment), Some(last_target)) = (self.segments.first(), self.last_target) else {
             command.take_set_points(&self.held);
@@ -436,7 +442,7 @@ impl FineInterpolator {
     /// `at`, or the last instant that a segment may be followed to.
     fn limit_time(&self, segment: &Segment, at: MonotonicTime) -> MonotonicTime {
         let beyond = self.config.target_update.usual_overrun() + self.config.extrapolate_periods;
-        at.min(segment.start + segment.length + self.config.period * i64::from(beyond))
+        at.min(segment.start + segment.length + self.config.period * i64::from(beyond) + self.ahead)
     }
 }
 

@@ -190,6 +190,33 @@ fn a_loss_is_ridden_through_and_then_held() {
     }
 }
 
+/// Set-points that are made ahead of their instant: an update is overdue when it is not there in time, and not when it could not
+/// be there yet. As many as the limit says are ridden through at constant speed, without a step when the next one comes.
+#[test]
+fn set_points_made_ahead_are_not_overdue_for_that() {
+    for tenths in [0, 5, 11, 22, 44] {
+        let ahead = DurationNs(PERIOD.0 / 10 * tenths);
+        let mut interpolator = interpolator(TargetUpdate::Interpolate, MAX_EXTRAPOLATION);
+        interpolator.start(Some(Position(0)));
+        // Each update comes half a period behind its stamp; those of 11 to 14 are lost.
+        let mut last = None;
+        for step in 0..200_i64 {
+            let now = time(0, step * 100);
+            if step % 10 == 5 && !(11..15).contains(&(step / 10)) {
+                let target = step / 10 + 2;
+                interpolator.update(time(target, 0), &position(target * 1_000)).unwrap();
+            }
+            let mut command = AxisCommand::default();
+            let quality = interpolator.write_ahead(now + ahead, ahead, &mut command);
+            assert_ne!(quality, Quality::Lost, "{ahead} {step}");
+            let moved = command.get(PositionCommand).unwrap();
+            if let Some(before) = last.replace(moved).filter(|_| step > 60) {
+                assert_eq!(moved - before, 100, "{ahead} {step}");
+            }
+        }
+    }
+}
+
 #[test]
 fn without_updates_an_axis_never_gets_faster_and_goes_on_slowing_down() {
     // Speeding up by 1000 more each period, then silence: it goes on as fast as it was, no faster.
