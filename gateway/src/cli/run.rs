@@ -13,7 +13,7 @@ use tracing_subscriber::EnvFilter;
 use super::{CliError, RunArguments};
 use crate::check::{Request, check};
 use crate::config::{Config, LogLevel};
-use crate::finding::{Findings, Severity};
+use crate::finding::{Finding, Findings, Severity};
 use crate::mapping::Mapping;
 use crate::runner;
 use crate::settings::Store;
@@ -23,7 +23,7 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Runs the box until it is asked to end.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
-    let (mut good, findings) = read(&arguments.config)?;
+    let (mut good, findings) = read(&arguments.config).map_err(|findings| refusal(&findings))?;
     log_to_stderr(good.config.log_level);
     tell(&findings);
     let [stop, hurry] = super::signal::stop_and_hurry_on_signals()?;
@@ -73,6 +73,13 @@ fn read(path: &Path) -> Result<(Good, Findings), Findings> {
         }
         _ => Err(outcome.tables.findings),
     }
+}
+
+/// Why the files are refused, with what else asks for something; notes on tables as they are shipped are for `check`.
+fn refusal(findings: &Findings) -> String {
+    let colours =
+        std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    findings.shown(colours, Finding::asks)
 }
 
 /// Logs warnings; notes are for `check`.

@@ -61,3 +61,26 @@ fn a_refused_reload_leaves_the_box_as_it_was_and_a_good_one_starts_it_anew() {
     await_line(&log, anew.find("axisbridge restarts").unwrap(), "EtherNet/IP");
     assert!(running.terminate(PATIENCE).success());
 }
+
+/// A start with a broken overlay says what is wrong and nothing of the shipped tables.
+#[test]
+fn a_refused_start_shows_its_errors_alone() {
+    let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join("refused-start");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    let own = "format = 1\noverlay = \"start\"\n[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmissing = \"rejekt\"\n";
+    fs::write(folder.join("own.toml"), own).unwrap();
+    fs::write(folder.join("box.toml"), configuration()).unwrap();
+    let mut command = Command::new(axisbridge());
+    command
+        .args(["run", "--config"])
+        .arg(folder.join("box.toml"))
+        .env_remove("RUST_LOG")
+        .stdin(Stdio::null());
+    let output = command.output().expect("the command can be started");
+    let text = String::from_utf8(output.stderr).expect("text");
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    let heads: Vec<_> = text.lines().filter(|line| line.contains("[AX")).collect();
+    assert_eq!(heads.len(), 1, "{text}");
+    assert!(heads[0].starts_with("error[AX0012]"), "{text}");
+}
