@@ -141,6 +141,8 @@ struct Path {
     begun: i64,
     compared: u64,
     wraps: u64,
+    /// How far the controller has been, in counts.
+    farthest: i64,
 }
 
 fn field<'f>(mut fields: impl Iterator<Item = &'f Field>, signal: Signal) -> Field {
@@ -211,6 +213,7 @@ impl Path {
             begun: 0,
             compared: 0,
             wraps: 0,
+            farthest: 0,
         };
         for report in [Report::Ready, Report::Operating] {
             let position = OperatingMode::Position.into();
@@ -310,6 +313,7 @@ impl Path {
         }
         self.speed += (self.wanted.clamp(-SPEED, SPEED) - self.speed).clamp(-CHANGE, CHANGE);
         self.commanded += self.speed;
+        self.farthest = self.farthest.max(self.commanded.abs());
         if phase + 1 == MOTION + REST {
             self.compare();
         }
@@ -401,6 +405,7 @@ fn paths() -> Vec<Path> {
 fn run(cycles: u64) {
     let paths = paths();
     assert!(paths.len() >= 4, "drives of both profiles: {}", paths.len());
+    let (mut counters, mut commands) = (0, 0);
     for mut path in paths {
         let begin = Instant::now();
         for _ in 0..cycles {
@@ -409,6 +414,8 @@ fn run(cycles: u64) {
         let least = cycles / 2 / (MOTION + REST) - 1;
         assert!(path.compared >= least, "{}: {} comparisons", path.name, path.compared);
         assert!(path.time.steps() > 0 || cycles < 100_000, "{}: no step of the clock", path.name);
+        counters += path.wraps;
+        commands += u32::from(path.unwind.is_none() && path.farthest > i64::from(i32::MAX));
         println!(
             "{:<10} {cycles} cycles, {} comparisons, {} steps of the clock, {} wraps of the drive's counter, {:.1} s",
             path.name,
@@ -418,6 +425,7 @@ fn run(cycles: u64) {
             begin.elapsed().as_secs_f64(),
         );
     }
+    assert!(counters > 0 && commands > 0, "nothing wraps: {counters} counters, {commands} commands");
 }
 
 #[test]
@@ -485,7 +493,7 @@ fn the_whole_chain_ends_where_the_controller_wants_it() {
             rig.gateway_clock.follow(rig.now(), &master);
         }
         // A move has ended, and its dwell has begun.
-        let ended = usize::try_from(rig.report().steps_finished).expect("some") / 2;
+        let ended = rig.report().steps_finished / 2;
         if ended > compared {
             probe.run_for(&mut rig, DurationNs::from_millis(300));
             let wanted = ends[compared] * 1e9;

@@ -236,7 +236,11 @@ fn a_controller_gets_an_axis_on_the_move_without_a_jump() {
         last = here;
     }
     // 2 turns per second are 4 million nanoturns in a cycle of 2 ms; it only gets slower.
-    assert!(steps.iter().all(|step| (-20_000..4_100_000).contains(step)), "{:?}", steps.iter().max());
+    assert!(
+        steps.iter().all(|step| (-30_000..4_100_000).contains(step)),
+        "{:?}",
+        (steps.iter().min(), steps.iter().max())
+    );
     let report = bench.rig.report();
     assert_eq!((report.failure.as_ref(), report.steps_finished), (None, 3), "{report}");
 }

@@ -250,7 +250,7 @@ fn the_actual_update_window_is_that_of_figure_2_1_6() {
         if rig.run_device() && rig.device.is_synchronous() {
             let stamp = rig.header().time_stamp.expect("asked for") - EPOCH - start;
             assert_eq!(stamp, task * TASK, "the actual values of this very task");
-            sent.push((stamp.next_multiple_of(CUP) / CUP, stamp.next_multiple_of(CUP) - stamp));
+            sent.push((stamp.div_ceil(CUP), stamp.next_multiple_of(CUP) - stamp));
         }
     }
     let (cycles, early): (Vec<u64>, Vec<u64>) = sent.into_iter().unzip();
