@@ -364,7 +364,7 @@ impl Engine {
     /// Moves the next cycle of each bus that has begun one towards the grid of system time.
     fn follow_time(&mut self) {
         let Self { buses, devices, axes, schedule, locks, clock, notices, .. } = self;
-        for place in 0..buses.len() {
+        for (place, lock) in locks.iter_mut().enumerate().take(buses.len()) {
             let next = buses.get(place).next_cycle();
             if !schedule.take_sent(place) && next.is_some() {
                 continue;
@@ -372,7 +372,7 @@ impl Engine {
             let grid = devices.iter().find_map(|channel| channel.grid(|axis| buses.of(axis) == place));
             let mut numbered = axes.iter().enumerate();
             let torque = numbered.any(|(number, axis)| buses.of(number) == place && axis.may_have_torque());
-            let (bus, lock) = (buses.get_mut(place), &mut locks[place]);
+            let bus = buses.get_mut(place);
             let (span, before) = (bus.cycle_time(), lock.phase().state);
             if let Some(grid) = grid {
                 lock.refer(grid, span);

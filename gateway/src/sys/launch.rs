@@ -133,7 +133,7 @@ mod tests {
         in_namespace("the_kernel_says_which_discipline", || {
             ip("link add south0 type veth peer name south1");
             ip("link set south0 up");
-            let south = link::index("south0").ok().expect("it is there");
+            let Ok(south) = link::index("south0") else { panic!("it is there") };
             let tc = Command::new("tc").args(["qdisc", "replace", "dev", "south0", "root", "pfifo"]).status();
             assert!(tc.expect("tc belongs to iproute2").success());
             assert_eq!(root_discipline(south).unwrap().as_deref(), Some("pfifo"));
