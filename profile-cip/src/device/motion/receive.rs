@@ -266,7 +266,7 @@ impl Engine {
         }
         let cycle = SystemTime(time_stamp).since(SystemTime(system_time)).as_nanos();
         let ahead = SystemTime(time_stamp).since(SystemTime(arrived)).as_nanos();
-        if age != Age::Alarming {
+        if matches!(age, Age::OnTime | Age::Late) {
             self.node.fresh_update();
         }
         match age {
