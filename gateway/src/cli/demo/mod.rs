@@ -23,6 +23,7 @@ use crate::runner::{self, RunningBox, StartError};
 use crate::settings::Store;
 use crate::simulate::clock::ClockPlan;
 use crate::simulate::controller::{self, Endpoints};
+use crate::simulate::controller_time::{ControllerTime, TimePlan};
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
 use crate::status::BoxState;
@@ -84,7 +85,8 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let controller_config = setup::controller(&mapping, &counts, UPDATE_PERIOD_US);
     let steps = program::standard(&plans, seconds);
     let told = program::titles(&plans);
-    let outcome = controller::run(endpoints, controller_config, steps, &stop, &mut |event| {
+    let mut time = ControllerTime::start(TimePlan::Host(ClockPlan::default()))?;
+    let outcome = controller::run(endpoints, controller_config, &mut time, steps, &stop, &mut |event| {
         use profile_cip::controller::Event;
         match event {
             Event::StepStarted { step } => progress.step(told.get(*step).map_or("", String::as_str)),
@@ -114,7 +116,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
 fn endpoints(listen: Ipv4Addr) -> Endpoints {
     let target = if listen.is_unspecified() { Ipv4Addr::new(127, 0, 0, 2) } else { listen };
     let [.., last] = target.octets();
-    Endpoints { target, bind: Ipv4Addr::new(127, 0, 1, last), clock: ClockPlan::default() }
+    Endpoints { target, bind: Ipv4Addr::new(127, 0, 1, last) }
 }
 
 fn wait_until_ready(running: &RunningBox, progress: &mut Progress) -> Result<(), CliError> {
