@@ -78,6 +78,9 @@ struct DemoArguments {
     /// Buses of the two axes, separated by commas: the first axis is on the first bus. A third bus has a third axis.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES)]
     drives: Vec<demo::DriveKind>,
+    /// Time of controller and gateway. "ptp" needs root and `ip`.
+    #[arg(long, value_name = "SOURCE", value_enum, default_value_t)]
+    time: demo::DemoTime,
     /// Write the recording of both sides to this file.
     #[arg(long, value_name = "FILE", default_value = "axisbridge-demo.pcapng")]
     capture: PathBuf,

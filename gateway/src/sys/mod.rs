@@ -16,6 +16,7 @@ pub mod gate;
 pub mod interface_lock;
 pub mod interfaces;
 pub mod link;
+pub mod namespace;
 pub mod packet_socket;
 pub mod phc;
 pub mod ptp_socket;
@@ -24,6 +25,3 @@ pub mod udp;
 
 mod option;
 mod receive;
-
-#[cfg(test)]
-mod namespace;

@@ -1,14 +1,14 @@
 //! A clock that may be the grandmaster, for the bench: it tells its time as long as no better clock is heard.
 //!
 //! ```text
-//!  +-----------+  no Announce for 6 to 8 s  +--------+  a better clock  +-----------+
+//!  +-----------+  no Announce for 6 to 12 s +--------+  a better clock  +-----------+
 //!  | Listening |--------------------------->| Master |----------------->| Outranked |
 //!  +-----------+                            +--------+ <----------------+-----------+
 //!        |            a better clock                      it is silent        ^
 //!        +--------------------------------------------------------------------+
 //! ```
 //!
-//! What it tells of itself is what it is (`time-sync` of CIP Volume 9, 2): class 248, accuracy 0xFE, source 0xA0, nothing traceable.
+//! What it tells of itself is what it is: class 248, accuracy 0xFE, source 0xA0, nothing traceable.
 
 use std::fmt;
 use std::io;
@@ -124,4 +124,148 @@ pub fn lead(
         while port.measurements.take().is_some() {}
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::guard::tests::{announce, head};
+    use super::super::wire::Arrived;
+    use super::*;
+
+    const SECOND: u64 = 1_000_000_000;
+    const START: MonotonicTime = MonotonicTime(50 * SECOND);
+    const OWN: [u8; 8] = [9; 8];
+    /// How long a message takes through the host, ns.
+    const SENDING: u64 = 7_000;
+
+    /// A message on the wire: when, on which port, its bytes.
+    type Message = (u64, u16, Vec<u8>);
+
+    /// A network in virtual time: what comes, and what was sent. Times are since the start, ns.
+    struct Network {
+        now: MonotonicTime,
+        end: u64,
+        coming: Vec<Message>,
+        sent: Vec<Message>,
+    }
+
+    impl Network {
+        fn passed(&self) -> u64 {
+            self.now.0 - START.0
+        }
+    }
+
+    impl Wire for Network {
+        fn now(&self) -> MonotonicTime {
+            self.now
+        }
+
+        fn wait(&mut self, until: MonotonicTime, buffer: &mut [u8]) -> io::Result<Option<Arrived>> {
+            let until = until.0 - START.0;
+            let first = self.coming.first().filter(|(at, ..)| *at <= until).map(|(at, ..)| *at);
+            self.now = MonotonicTime(START.0 + first.unwrap_or(until).max(self.passed()));
+            if first.is_none() {
+                return Ok(None);
+            }
+            let (at, port, message) = self.coming.remove(0);
+            buffer[..message.len()].copy_from_slice(&message);
+            let event = (port == 319).then_some(MonotonicTime(START.0 + at));
+            Ok(Some(Arrived { len: message.len(), event }))
+        }
+
+        fn send_event(&mut self, message: &[u8]) -> io::Result<Option<MonotonicTime>> {
+            self.sent.push((self.passed(), 319, message.to_vec()));
+            Ok(Some(MonotonicTime(self.now.0 + SENDING)))
+        }
+
+        fn send_general(&mut self, message: &[u8]) {
+            self.sent.push((self.passed(), 320, message.to_vec()));
+        }
+
+        fn is_ended(&self) -> bool {
+            self.passed() >= self.end
+        }
+    }
+
+    /// The clock is 3 s ahead of the wire and gains 100 ppm.
+    fn told(at: MonotonicTime) -> SystemTime {
+        let passed = at.0 - START.0;
+        SystemTime(at.0 + 3 * SECOND + passed / 10_000)
+    }
+
+    /// Runs the clock for some seconds. Gives what it has sent, and its states.
+    fn run(seconds: u64, mut coming: Vec<Message>) -> (Vec<Message>, Vec<MasterState>) {
+        coming.sort();
+        let mut network = Network { now: START, end: seconds * SECOND, coming, sent: Vec::new() };
+        let mut states = Vec::new();
+        let config = MasterConfig { priorities: [120, 121], ..MasterConfig::new(OWN) };
+        lead(&config, &mut network, &told, &mut |state| states.push(state)).unwrap();
+        (network.sent, states)
+    }
+
+    fn of_kind(sent: &[Message], kind: u8) -> Vec<&Message> {
+        sent.iter().filter(|(.., message)| message[0] & 0xF == kind).collect()
+    }
+
+    fn time_in(message: &[u8]) -> u64 {
+        let seconds = u64::from_be_bytes([&[0, 0], &message[34..40]].concat().try_into().unwrap());
+        seconds * SECOND + u64::from(u32::from_be_bytes(message[40..44].try_into().unwrap()))
+    }
+
+    #[test]
+    fn a_clock_alone_tells_its_own_time_in_the_intervals_of_cip_sync() {
+        let mut request = head(0x1, 44, 5, 77);
+        request[8..16].copy_from_slice(&(3_i64 << 16).to_be_bytes());
+        let asked = 15 * SECOND + 123_456;
+        let (sent, states) = run(30, vec![(asked, 319, request)]);
+        assert_eq!(states, [MasterState::Listening, MasterState::Master]);
+        let began = sent[0].0;
+        assert!((6 * SECOND..=12 * SECOND).contains(&began), "it listens for three to six intervals: {began}");
+
+        let announces = of_kind(&sent, 0xB);
+        assert!(announces.iter().all(|(_, port, message)| *port == 320 && message.len() == 64));
+        assert!(announces.windows(2).all(|pair| pair[1].0 - pair[0].0 == 2 * SECOND), "{announces:?}");
+        let (.., message) = announces.last().unwrap();
+        // Priority 1, class, accuracy; priority 2, identity, steps; source.
+        assert_eq!((message[1] & 0xF, message[4], message[47..50].to_vec()), (2, 0, vec![120, 248, 0xFE]));
+        assert_eq!((message[52], &message[53..61], &message[61..64]), (121, &OWN[..], &[0, 0, 0xA0][..]));
+        let traceable = u16::from_be_bytes([message[6], message[7]]) & 0x0034;
+        assert_eq!(traceable, 0, "neither time nor rate nor UTC offset is promised");
+
+        let (syncs, follow_ups) = (of_kind(&sent, 0x0), of_kind(&sent, 0x8));
+        assert!((18..=25).contains(&syncs.len()) && syncs.len() == follow_ups.len());
+        for (sync, follow_up) in syncs.iter().zip(&follow_ups) {
+            assert_eq!((sync.1, sync.2.len(), sync.2[6]), (319, 44, 0x02), "two-step");
+            assert_eq!((follow_up.1, follow_up.2.len()), (320, 44));
+            assert_eq!(sync.2[30..32], follow_up.2[30..32], "the same sequence number");
+            let left = MonotonicTime(START.0 + sync.0 + SENDING);
+            assert_eq!(time_in(&follow_up.2), told(left).0);
+        }
+        assert!(syncs.windows(2).all(|pair| pair[1].0 - pair[0].0 == SECOND));
+
+        let answers = of_kind(&sent, 0x9);
+        assert_eq!(answers.len(), 1);
+        let (.., answer) = answers[0];
+        assert_eq!((answer.len(), &answer[30..32], answer[33]), (54, &[0, 77][..], 0));
+        assert_eq!(answer[44..52], [5; 8], "for who has asked");
+        assert_eq!(answer[8..16], (3_i64 << 16).to_be_bytes(), "with the correction of the request");
+        assert_eq!(time_in(answer), told(MonotonicTime(START.0 + asked)).0);
+    }
+
+    #[test]
+    fn a_better_clock_is_left_alone_while_it_is_heard() {
+        let worse = |second: u64| (second * SECOND, 320, announce(1, 130, u16::try_from(second).unwrap()));
+        let (sent, states) = run(30, (1..30).map(worse).collect());
+        assert_eq!(states, [MasterState::Listening, MasterState::Master]);
+        assert!(of_kind(&sent, 0x0).len() > 20, "a worse one is no reason to wait");
+
+        let better = |second: u64| (second * SECOND, 320, announce(1, 100, u16::try_from(second).unwrap()));
+        let (sent, states) = run(50, (15..30).map(better).collect());
+        let outranked = MasterState::Outranked { by: [1; 8] };
+        let course = [MasterState::Listening, MasterState::Master, outranked, MasterState::Master];
+        assert_eq!(states, course);
+        let silent = sent.iter().filter(|(at, port, _)| *port == 320 && (20..30).contains(&(at / SECOND)));
+        assert_eq!(silent.count(), 0);
+        assert!(of_kind(&sent, 0xB).iter().any(|(at, ..)| *at > 45 * SECOND), "it is the master again");
+    }
 }
