@@ -182,7 +182,9 @@ pub fn start(
         }
         if Instant::now() > end {
             let limit = limit.as_secs();
-            return Err(format!("expected a synchronized time within {limit} s (--time-limit): {waits}").into());
+            return Err(
+                format!("expected a synchronized time within {limit} s (--time-limit): {waits}").into()
+            );
         }
         std::thread::sleep(LOOK);
     }

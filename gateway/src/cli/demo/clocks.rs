@@ -74,7 +74,9 @@ impl Clocks {
     /// Lays the cables and starts the grandmaster. `listen` is the address that was asked for.
     pub fn start(listen: Ipv4Addr, progress: &mut Progress) -> Result<Self, CliError> {
         if listen.to_string() != ADDRESS {
-            return Err(format!("--time ptp has a network of its own: expected no --listen, got {listen}").into());
+            return Err(
+                format!("--time ptp has a network of its own: expected no --listen, got {listen}").into()
+            );
         }
         let missing = |error: io::Error| {
             format!(

@@ -220,7 +220,10 @@ mod tests {
         let (sent, states) = run(30, vec![(asked, 319, request)]);
         assert_eq!(states, [MasterState::Listening, MasterState::Master]);
         let began = sent[0].0;
-        assert!((6 * SECOND..=12 * SECOND).contains(&began), "it listens for three to six intervals: {began}");
+        assert!(
+            (6 * SECOND..=12 * SECOND).contains(&began),
+            "it listens for three to six intervals: {began}"
+        );
 
         let announces = of_kind(&sent, 0xB);
         assert!(announces.iter().all(|(_, port, message)| *port == 320 && message.len() == 64));

@@ -1,0 +1,427 @@
+//! Grandmaster, controller and gateway as three machines with a switch between them, and axes that move synchronously while something
+//! happens to their time.
+//!
+//! ```text
+//! grandmaster (ptp4l) 192.168.40.1 ------------+
+//! a better one        192.168.40.4 --- relay --+-- switch (a bridge)
+//! controller          192.168.40.2 ------------+
+//! gateway             192.168.40.3 ------------+      gateway --- SERCOS cable --- two drives
+//! ```
+//!
+//! The namespaces of a host have one oscillator. The clock of the better grandmaster is 4 ms and 40 ppm off it: by so much the
+//! controller's clock and the gateway's are off their master's. The relay loses and delays frames, as this kernel need not have
+//! `netem`.
+//!
+//! What the drives were sent is judged by the motion checker, from the recording of the gateway.
+
+use std::io::{BufRead as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use axisbridge::config::Config;
+use axisbridge::sys::packet_socket::{self, PacketSocket};
+use axisbridge_tests::host::in_real_time;
+use axisbridge_tests::namespace::{Namespace, cable};
+use axisbridge_tests::peer;
+use axisbridge_tests::process::Running;
+use axisbridge_tests::rig::motion_checker::recording;
+use axisbridge_tests::rig::motion_checker::violation::Rule;
+use profile_generic::time::DurationNs;
+use serde_json::Value;
+
+use super::ptp::{ptp4l, wait_for_count};
+use super::{in_namespace, one_bus, scratch};
+
+const GATEWAY: &str = "192.168.40.3";
+const CONTROLLER: &str = "192.168.40.2";
+
+/// Set for the copy of this test binary that is the relay.
+const RELAY: &str = "AXISBRIDGE_TEST_RELAY";
+
+const CONFIGURATION: &str = r#"
+[box]
+name = "three clocks"
+
+[time]
+source = "ptp"
+threshold = "100 us" # the stamps of a busy host are late now and then
+
+[[device]]
+name = "front"
+listen = "192.168.40.3"
+axes = ["turntable", "slide"]
+update_period = { min = "4 ms", max = "32 ms" }
+
+[device.identity]
+vendor_id = 1
+product_code = 1
+serial_number = 1
+
+[[axis]]
+name = "turntable"
+instance = 1
+drive = "drive-a"
+unit = "revolution"
+motion_resolution = 1_000_000
+
+[[axis]]
+name = "slide"
+instance = 2
+drive = "drive-b"
+unit = "millimetre"
+motion_resolution = 10_000
+
+[axis.limits]
+position_min = -5.0
+position_max = 1_000.0
+
+[south.sercos]
+interface = "sercos0"
+cycle_time = "4 ms"
+jitter = "200 us"
+allowed_losses = 500 # nobody promises the tests a host that keeps time
+
+[[south.sercos.drive]]
+name = "drive-a"
+address = 1
+
+[[south.sercos.drive]]
+name = "drive-b"
+address = 2
+"#;
+
+/// Controller update period: two cycles of the bus.
+const PERIOD_US: u32 = 8_000;
+
+/// How often a grandmaster tells the time, and how long each phase lasts at least.
+#[derive(Clone, Copy)]
+struct Pace {
+    log_announce: i8,
+    log_sync: i8,
+    phase: Duration,
+    /// How long the axes move: as long as all phases.
+    motion: u32,
+}
+
+/// As CIP Sync does.
+const CIP_SYNC: Pace = Pace { log_announce: 1, log_sync: 0, phase: Duration::from_secs(60), motion: 420 };
+
+/// Four times as often, for a short test.
+const FAST: Pace = Pace { log_announce: -1, log_sync: -2, phase: Duration::from_secs(3), motion: 34 };
+
+/// A machine on the switch, at interface `net0`; behind the relay, `through` is its namespace.
+fn plug(switch: &Namespace, role: &str, address: &str) -> Namespace {
+    let host = Namespace::new(role);
+    let port = format!("to-{role}");
+    cable((&host, "net0", Some(&format!("{address}/24"))), (switch, &port, None));
+    bridge(switch, &["link", "set", &port, "master", "switch"]);
+    host
+}
+
+fn bridge(switch: &Namespace, arguments: &[&str]) {
+    let status = Command::new("ip").args(["-n", switch.name()]).args(arguments).status();
+    assert!(status.is_ok_and(|status| status.success()), "ip {arguments:?}");
+}
+
+fn switch() -> Namespace {
+    let switch = Namespace::new("switch");
+    bridge(&switch, &["link", "add", "switch", "type", "bridge", "mcast_snooping", "0"]);
+    bridge(&switch, &["link", "set", "switch", "up"]);
+    switch
+}
+
+/// The machines with the gateway, its drives and the controller at work.
+struct Plant {
+    switch: Namespace,
+    master: Namespace,
+    controller: Namespace,
+    gateway: Namespace,
+    drives: (Namespace, Running),
+    run: Running,
+    log: PathBuf,
+    capture: PathBuf,
+}
+
+impl Plant {
+    fn start(name: &str) -> Self {
+        let switch = switch();
+        let master = plug(&switch, "gm", "192.168.40.1");
+        let controller = plug(&switch, "ctl", CONTROLLER);
+        let gateway = plug(&switch, "box", GATEWAY);
+        let drives = Namespace::new("drv");
+        cable((&gateway, "sercos0", None), (&drives, "sercos0", None));
+        let arguments =
+            ["simulate", "sercos-drive", "--interface", "sercos0", "--slaves", "2", "--linear", "2"];
+        let mut line = in_namespace(&drives, &arguments);
+        let line = Running::start("simulate sercos-drive", line.stdin(Stdio::null()).stderr(Stdio::null()));
+        let (config, log) = (scratch(&format!("{name}.toml")), scratch(&format!("{name}.log")));
+        let capture = scratch(&format!("{name}.pcapng"));
+        std::fs::write(&config, CONFIGURATION).expect("the configuration can be written");
+        let mut run = in_namespace(&gateway, &["run", "--config"]);
+        run.arg(&config).arg("--capture").arg(&capture).env("NO_COLOR", "1");
+        run.stderr(std::fs::File::create(&log).expect("the log can be written"));
+        let run = Running::start("run", &mut run);
+        Self { switch, master, controller, gateway, drives: (drives, line), run, log, capture }
+    }
+
+    /// A controller that moves both axes for so many seconds; what it prints goes to a file.
+    fn controller(&self, name: &str, seconds: u32, time: &[&str]) -> (Running, PathBuf) {
+        let (seconds, period) = (seconds.to_string(), PERIOD_US.to_string());
+        let arguments = [
+            "simulate",
+            "controller",
+            "--target",
+            GATEWAY,
+            "--bind",
+            CONTROLLER,
+            "--axes",
+            "2",
+            "--counts-per-unit",
+            "1000000,10000",
+            "--speed",
+            "2,20",
+            "--json",
+            "--seconds",
+            &seconds,
+            "--update-period-us",
+            &period,
+        ];
+        let printed = scratch(&format!("{name}-controller.json"));
+        let mut command = in_namespace(&self.controller, &arguments);
+        command.args(time).stdout(std::fs::File::create(&printed).expect("the result can be written"));
+        (Running::start("simulate controller", &mut command), printed)
+    }
+
+    fn text(&self) -> String {
+        std::fs::read_to_string(&self.log).unwrap_or_default()
+    }
+
+    /// Waits until the log has `text` once more than it had in `before`.
+    fn wait_for_another(&mut self, before: &str, text: &str) {
+        wait_for_count(&self.log, text, before.matches(text).count() + 1, &mut self.run);
+    }
+
+    /// Ends everything. Gives the log.
+    fn end(mut self) -> String {
+        assert!(self.run.ended().is_none(), "the box still runs");
+        assert_eq!(self.run.terminate(Duration::from_secs(10)).code(), Some(0));
+        self.drives.1.terminate(Duration::from_secs(10));
+        self.text()
+    }
+}
+
+/// Both axes ended where they had to.
+fn both_arrived(printed: &Path) {
+    let text = std::fs::read_to_string(printed).unwrap_or_default();
+    let result: Value = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
+    let axes = result["axes"].as_array().expect("an array `axes`");
+    assert_eq!(axes.len(), 2, "{result}");
+    for axis in axes {
+        assert!(axis["in_window"] == true && axis["target"].as_f64().unwrap() > 1.0, "{result}");
+    }
+}
+
+/// Nothing that the drives were sent was a jump.
+fn no_jump(capture: &Path) {
+    let config = Config::parse(CONFIGURATION, "three clocks").expect("the configuration is right");
+    let period = DurationNs::from_micros(PERIOD_US.into());
+    let judged = recording::judge(&config, period, capture, |_| {}).expect("the recording can be read");
+    let shown: Vec<_> = judged.violations.iter().take(5).map(ToString::to_string).collect();
+    assert!(
+        shown.is_empty(),
+        "{} violations, frames late by {} at most: {}",
+        judged.violations.len(),
+        judged.late,
+        shown.join("\n")
+    );
+    for (axis, fastest) in judged.statistics.iter().zip([1e9, 10e9]) {
+        assert!(axis.set_points > 1_000 && axis.fastest > fastest, "synchronous set-points: {axis:?}");
+    }
+    // The same recording with one update of the controller a thousandth of a unit further on.
+    let mut updates = 0;
+    let judged = recording::judge(&config, period, capture, |commanded| {
+        updates += 1;
+        if let (800, Some(axis)) = (updates, commanded.axes.first_mut()) {
+            axis.trims.0 += 1_000.0;
+        }
+    });
+    let found = judged.expect("the recording can be read").violations;
+    assert!(found.iter().any(|found| found.axis == 0 && found.rule == Rule::Velocity), "{found:?}");
+}
+
+fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
+    if !peer::namespaces_or_skip(name) || !peer::ptp4l_or_skip(name) {
+        return;
+    }
+    let _alone = one_bus();
+    in_real_time(name, || {
+        let mut plant = Plant::start(name);
+        let intervals =
+            format!("logAnnounceInterval {}\nlogSyncInterval {}\n", pace.log_announce, pace.log_sync);
+        let mut master = ptp4l(&plant.master, 128, &intervals);
+        let time = ["--time", "ptp", "--time-threshold", "100"];
+        let (mut controller, printed) = plant.controller(name, pace.motion, &time);
+        wait_for_count(&plant.log, "-> Running", 2, &mut plant.run);
+        let started = plant.text();
+        assert!(!started.contains("Clock Sync"), "{started}");
+
+        let mut phases = Vec::new();
+        let mut phase = |plant: &mut Plant, title: &'static str, act: &mut dyn FnMut(&mut Plant, &str)| {
+            let (before, begun) = (plant.text(), Instant::now());
+            act(plant, &before);
+            std::thread::sleep(pace.phase.saturating_sub(begun.elapsed()));
+            phases.push((title, plant.text()[before.len()..].to_owned()));
+        };
+
+        phase(&mut plant, "the grandmaster is killed and comes back", &mut |plant, before| {
+            master.terminate(Duration::from_secs(10));
+            plant.wait_for_another(before, "holdover: the master is silent");
+            master = ptp4l(&plant.master, 128, &intervals);
+            plant.wait_for_another(before, "system time: synchronized");
+        });
+
+        // Behind a relay, to be able to lose and delay.
+        let relay = Namespace::new("relay");
+        let better = Namespace::new("gm2");
+        cable((&better, "net0", Some("192.168.40.4/24")), (&relay, "host", None));
+        cable((&relay, "net", None), (&plant.switch, "to-relay", None));
+        bridge(&plant.switch, &["link", "set", "to-relay", "master", "switch"]);
+        let own = std::env::current_exe().expect("own path");
+        let mut inside = relay.command(own.to_str().expect("UTF-8"));
+        inside.args(["--exact", "synchronous::relay", "--nocapture"]).env(RELAY, "host net");
+        let mut relaying = inside.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().expect("the relay");
+        let mut tell_relay = relaying.stdin.take().expect("piped");
+
+        // Its clock steps in the phase behind the next one.
+        let (announce, sync) = (pace.log_announce.to_string(), pace.log_sync.to_string());
+        let step_after = pace.phase.as_secs() + 12;
+        let step = format!("{step_after}:10");
+        let arguments = [
+            "simulate",
+            "grandmaster",
+            "--interface",
+            "net0",
+            "--priority1",
+            "100",
+            "--clock-offset",
+            "4",
+            "--clock-drift",
+            "40",
+            "--clock-step",
+            &step,
+            "--log-announce",
+            &announce,
+            "--log-sync",
+            &sync,
+        ];
+        let second_begun = Instant::now();
+        let mut second = in_namespace(&better, &arguments);
+        let mut second = Running::start("simulate grandmaster", second.stdout(Stdio::null()));
+        phase(&mut plant, "a better grandmaster appears", &mut |plant, before| {
+            plant.wait_for_another(before, "another grandmaster is followed");
+            plant.wait_for_another(before, "system time: synchronized");
+        });
+        assert!(second_begun.elapsed().as_secs() < step_after, "it has not stepped yet");
+
+        phase(&mut plant, "the grandmaster steps by 10 ms", &mut |plant, before| {
+            plant.wait_for_another(before, "the grandmaster's clock has stepped");
+            plant.wait_for_another(before, "system time: synchronized");
+        });
+
+        phase(&mut plant, "100 us of asymmetric delay and 20 % loss", &mut |_, _| {
+            writeln!(tell_relay, "100 20").expect("the relay listens");
+            std::thread::sleep(Duration::from_secs(4));
+        });
+
+        assert!(controller.ended().is_none(), "the axes have moved all the time");
+        let status = controller.wait(Duration::from_secs(90));
+        assert!(
+            status.success(),
+            "{status}: {}\n{}",
+            std::fs::read_to_string(&printed).unwrap_or_default(),
+            plant.text()
+        );
+        both_arrived(&printed);
+        second.terminate(Duration::from_secs(10));
+        master.terminate(Duration::from_secs(10));
+        drop(tell_relay);
+        // It ends with its input.
+        let _ = relaying.wait();
+        let capture = plant.capture.clone();
+        let log = plant.end();
+        for (title, text) in &phases {
+            println!("---- {title}\n{text}");
+        }
+        assert!(!log.contains("fault action") && !log.contains("Fault ("), "{log}");
+        no_jump(&capture);
+        for (title, text) in phases {
+            let lost = text.contains("holdover") || text.contains("not synchronized");
+            let alarms = text.matches("Clock Sync Alarm").count();
+            let expected = match title {
+                "the grandmaster is killed and comes back" => (true, 0),
+                "100 us of asymmetric delay and 20 % loss" => (false, 0),
+                _ => (true, alarms),
+            };
+            assert_eq!((lost, alarms), expected, "{title}: {text}");
+        }
+    });
+}
+
+#[test]
+fn axes_move_synchronously_through_changes_of_the_grandmaster() {
+    axes_move_through_changes_of_their_time(
+        "axes_move_synchronously_through_changes_of_the_grandmaster",
+        FAST,
+    );
+}
+
+#[test]
+#[ignore = "a minute for each phase"]
+fn axes_move_synchronously_for_minutes() {
+    axes_move_through_changes_of_their_time("axes_move_synchronously_for_minutes", CIP_SYNC);
+}
+
+/// Not a test of its own: passes IPv4 frames between two interfaces. A line of its input sets by how many microseconds longer frames
+/// take towards the second one, and how many of a hundred are lost in both directions. It ends with its input.
+#[test]
+fn relay() {
+    let Ok(interfaces) = std::env::var(RELAY) else { return };
+    const IPV4: u16 = 0x0800;
+    let sockets: Vec<PacketSocket> = interfaces
+        .split(' ')
+        .map(|interface| PacketSocket::open(interface, IPV4).expect("the interface is up"))
+        .collect();
+    let (sender, settings) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            let numbers: Vec<u64> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
+            if let [delay, loss] = numbers[..] {
+                let _ = sender.send((Duration::from_micros(delay), loss));
+            }
+        }
+        drop(sender);
+    });
+    let (mut delay, mut loss, mut passed) = (Duration::ZERO, 0, 0_u64);
+    let mut buffer = [0; 2048];
+    loop {
+        match settings.try_recv() {
+            Ok(set) => (delay, loss) = set,
+            Err(std::sync::mpsc::TryRecvError::Disconnected) => return,
+            Err(std::sync::mpsc::TryRecvError::Empty) => {}
+        }
+        packet_socket::wait(&sockets, Duration::from_millis(20)).expect("both interfaces are there");
+        for (from, to) in [(0, 1), (1, 0)] {
+            while let Ok(Some(received)) = sockets[from].recv(&mut buffer) {
+                let begun = Instant::now();
+                passed += 1;
+                // Spread out, and the same in each run.
+                if passed.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32 & 0xFFFF < loss * 0xFFFF / 100 {
+                    continue;
+                }
+                while from == 0 && begun.elapsed() < delay {}
+                let _ = sockets[to].send(&buffer[..received.len]);
+            }
+        }
+    }
+}
