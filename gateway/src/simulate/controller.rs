@@ -111,7 +111,9 @@ pub fn run(
     while !controller.is_closed() {
         if let Some(sample) = clock.sample() {
             // A step of the clock is told to the device with the controller's time offset.
-            time.feed(&sample);
+            if let Some(step) = time.feed(&sample) {
+                controller.time_stepped(step);
+            }
         }
         let followed = clock.grandmaster();
         if followed != grandmaster {

@@ -143,6 +143,12 @@ impl Controller {
         }
     }
 
+    /// System time has stepped by so much since the last call with one: the device is told with the next update. A step beyond a
+    /// millisecond is found without it, an update later.
+    pub fn time_stepped(&mut self, by: DurationNs) {
+        self.offset.step(by);
+    }
+
     /// Whether the run is over and everything is closed.
     #[must_use]
     pub fn is_closed(&self) -> bool {

@@ -53,12 +53,13 @@ fn grandmaster(namespace: &Namespace, priority: u8) -> Running {
     ptp4l(namespace, priority, "logAnnounceInterval 1\nlogSyncInterval 0\n")
 }
 
-/// `ptp4l` in a namespace with these settings; its log is `ptp4l-PRIORITY.log`.
+/// `ptp4l` in a namespace with these settings; its log is `ptp4l-PRIORITY.log`. It sets no clock (`free_running`): a slave would set
+/// that of the host, which all namespaces share.
 pub fn ptp4l(namespace: &Namespace, priority: u8, settings: &str) -> Running {
     let config = scratch(&format!("ptp4l-{priority}.conf"));
     let socket = socket(priority);
     let text = format!(
-        "[global]\ntime_stamping software\nnetwork_transport UDPv4\ndelay_mechanism E2E\n{settings}\
+        "[global]\ntime_stamping software\nfree_running 1\nnetwork_transport UDPv4\ndelay_mechanism E2E\n{settings}\
          logMinDelayReqInterval 0\ndscp_event 59\ndscp_general 47\ntx_timestamp_timeout 50\n\
          priority1 {priority}\nuds_address {}\n",
         socket.display()

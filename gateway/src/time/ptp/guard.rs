@@ -49,7 +49,7 @@ const STEPS_MAX: u16 = 255;
 /// First and last second that a clock may tell: corrections take none beyond the ends of 64 bit nanoseconds.
 const SECONDS: std::ops::Range<u64> = 2..9_000_000_000;
 
-mod kind {
+pub(super) mod kind {
     pub const SYNC: u8 = 0x0;
     pub const DELAY_REQUEST: u8 = 0x1;
     pub const FOLLOW_UP: u8 = 0x8;

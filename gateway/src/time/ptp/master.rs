@@ -8,7 +8,8 @@
 //!        +--------------------------------------------------------------------+
 //! ```
 //!
-//! What it tells of itself is what it is: class 248, accuracy 0xFE, source 0xA0, nothing traceable.
+//! What it tells of itself is what it is: class 248, accuracy 0xFE, source 0xA0, nothing traceable, and a time scale of its own: a host
+//! that took it for TAI would set its clock some 37 s wrong.
 
 use std::fmt;
 use std::io;
@@ -18,8 +19,8 @@ use statime::config::{ClockIdentity, InstanceConfig, SdoId};
 use statime::observability::port::PortState;
 use statime::time::Time;
 
-use super::guard::Guard;
-use super::wire::Wire;
+use super::guard::{Guard, MESSAGE_MAX, kind};
+use super::wire::{Arrived, Wire};
 use super::{ClockPort, Instance, LOG_ANNOUNCE, LOG_SYNC, PortSettings, time_properties};
 use crate::time::status::Identity;
 
@@ -80,6 +81,45 @@ impl fmt::Display for MasterState {
     }
 }
 
+/// Flag of an Announce, in the second octet of the flag field: the time counts seconds of TAI (clause 13.3.2.6).
+const PTP_TIME_SCALE: u8 = 0x08;
+
+/// The wire of a clock with a time scale of its own. The library calls the time of every grandmaster TAI.
+struct OwnTimeScale<'a, W>(&'a mut W);
+
+impl<W: Wire> Wire for OwnTimeScale<'_, W> {
+    fn now(&self) -> MonotonicTime {
+        self.0.now()
+    }
+
+    fn wait(&mut self, until: MonotonicTime, buffer: &mut [u8]) -> io::Result<Option<Arrived>> {
+        self.0.wait(until, buffer)
+    }
+
+    fn send_event(&mut self, message: &[u8]) -> io::Result<Option<MonotonicTime>> {
+        self.0.send_event(message)
+    }
+
+    fn send_general(&mut self, message: &[u8]) {
+        let mut buffer = [0; MESSAGE_MAX];
+        let is_announce = message.first().is_some_and(|first| first & 0x0F == kind::ANNOUNCE);
+        match (is_announce, buffer.get_mut(..message.len())) {
+            (true, Some(copy)) => {
+                copy.copy_from_slice(message);
+                if let Some(flags) = copy.get_mut(7) {
+                    *flags &= !PTP_TIME_SCALE;
+                }
+                self.0.send_general(copy);
+            }
+            _ => self.0.send_general(message),
+        }
+    }
+
+    fn is_ended(&self) -> bool {
+        self.0.is_ended()
+    }
+}
+
 /// Tells the time until the wire ends. `time` gives the time of the clock at an instant of the wire; `report` gets each other state.
 ///
 /// # Errors
@@ -106,6 +146,7 @@ pub fn lead(
         asymmetry: 0,
     };
     let time = |at| Time::from_nanos(time(at).0);
+    let wire = &mut OwnTimeScale(wire);
     let instance = Instance::new(settings.instance, time_properties());
     let guard = Guard::of_master(config.identity, config.domain);
     let mut port = ClockPort::start(&instance, &settings, config.seed, guard, wire)?;
@@ -129,7 +170,6 @@ pub fn lead(
 #[cfg(test)]
 mod tests {
     use super::super::guard::tests::{announce, head};
-    use super::super::wire::Arrived;
     use super::*;
 
     const SECOND: u64 = 1_000_000_000;
@@ -232,8 +272,7 @@ mod tests {
         // Priority 1, class, accuracy; priority 2, identity, steps; source.
         assert_eq!((message[1] & 0xF, message[4], message[47..50].to_vec()), (2, 0, vec![120, 248, 0xFE]));
         assert_eq!((message[52], &message[53..61], &message[61..64]), (121, &OWN[..], &[0, 0, 0xA0][..]));
-        let traceable = u16::from_be_bytes([message[6], message[7]]) & 0x0034;
-        assert_eq!(traceable, 0, "neither time nor rate nor UTC offset is promised");
+        assert_eq!(message[6..8], [0, 0], "neither TAI nor a UTC offset, and nothing is traceable");
 
         let (syncs, follow_ups) = (of_kind(&sent, 0x0), of_kind(&sent, 0x8));
         assert!((18..=25).contains(&syncs.len()) && syncs.len() == follow_ups.len());
