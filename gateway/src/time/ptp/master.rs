@@ -84,39 +84,61 @@ impl fmt::Display for MasterState {
 /// Flag of an Announce, in the second octet of the flag field: the time counts seconds of TAI (clause 13.3.2.6).
 const PTP_TIME_SCALE: u8 = 0x08;
 
-/// The wire of a clock with a time scale of its own. The library calls the time of every grandmaster TAI.
-struct OwnTimeScale<'a, W>(&'a mut W);
+/// Where a message has the interval of its kind, 2^n s.
+const LOG_INTERVAL: usize = 33;
 
-impl<W: Wire> Wire for OwnTimeScale<'_, W> {
+/// The wire of a master, which puts right what the library writes: it calls the time of every grandmaster TAI, and the interval of
+/// every message a second.
+struct MasterWire<'a, W> {
+    wire: &'a mut W,
+    log_announce: i8,
+    log_sync: i8,
+}
+
+impl<W> MasterWire<'_, W> {
+    /// The message as it goes out, in `buffer`.
+    fn corrected<'b>(&self, message: &'b [u8], buffer: &'b mut [u8; MESSAGE_MAX]) -> &'b [u8] {
+        let Some(copy) = buffer.get_mut(..message.len()) else { return message };
+        copy.copy_from_slice(message);
+        let kind = message.first().map_or(0, |first| first & 0x0F);
+        let log_interval = match kind {
+            kind::SYNC | kind::FOLLOW_UP => self.log_sync,
+            kind::ANNOUNCE => self.log_announce,
+            _ => return copy,
+        };
+        if let Some(place) = copy.get_mut(LOG_INTERVAL) {
+            *place = log_interval.cast_unsigned();
+        }
+        if let Some(flags) = copy.get_mut(7).filter(|_| kind == kind::ANNOUNCE) {
+            *flags &= !PTP_TIME_SCALE;
+        }
+        copy
+    }
+}
+
+impl<W: Wire> Wire for MasterWire<'_, W> {
     fn now(&self) -> MonotonicTime {
-        self.0.now()
+        self.wire.now()
     }
 
     fn wait(&mut self, until: MonotonicTime, buffer: &mut [u8]) -> io::Result<Option<Arrived>> {
-        self.0.wait(until, buffer)
+        self.wire.wait(until, buffer)
     }
 
     fn send_event(&mut self, message: &[u8]) -> io::Result<Option<MonotonicTime>> {
-        self.0.send_event(message)
+        let mut buffer = [0; MESSAGE_MAX];
+        let message = self.corrected(message, &mut buffer);
+        self.wire.send_event(message)
     }
 
     fn send_general(&mut self, message: &[u8]) {
         let mut buffer = [0; MESSAGE_MAX];
-        let is_announce = message.first().is_some_and(|first| first & 0x0F == kind::ANNOUNCE);
-        match (is_announce, buffer.get_mut(..message.len())) {
-            (true, Some(copy)) => {
-                copy.copy_from_slice(message);
-                if let Some(flags) = copy.get_mut(7) {
-                    *flags &= !PTP_TIME_SCALE;
-                }
-                self.0.send_general(copy);
-            }
-            _ => self.0.send_general(message),
-        }
+        let message = self.corrected(message, &mut buffer);
+        self.wire.send_general(message);
     }
 
     fn is_ended(&self) -> bool {
-        self.0.is_ended()
+        self.wire.is_ended()
     }
 }
 
@@ -146,7 +168,7 @@ pub fn lead(
         asymmetry: 0,
     };
     let time = |at| Time::from_nanos(time(at).0);
-    let wire = &mut OwnTimeScale(wire);
+    let wire = &mut MasterWire { wire, log_announce: config.log_announce, log_sync: config.log_sync };
     let instance = Instance::new(settings.instance, time_properties());
     let guard = Guard::of_master(config.identity, config.domain);
     let mut port = ClockPort::start(&instance, &settings, config.seed, guard, wire)?;
@@ -234,11 +256,11 @@ mod tests {
     }
 
     /// Runs the clock for some seconds. Gives what it has sent, and its states.
-    fn run(seconds: u64, mut coming: Vec<Message>) -> (Vec<Message>, Vec<MasterState>) {
+    fn run(seconds: u64, log_sync: i8, mut coming: Vec<Message>) -> (Vec<Message>, Vec<MasterState>) {
         coming.sort();
         let mut network = Network { now: START, end: seconds * SECOND, coming, sent: Vec::new() };
         let mut states = Vec::new();
-        let config = MasterConfig { priorities: [120, 121], ..MasterConfig::new(OWN) };
+        let config = MasterConfig { priorities: [120, 121], log_sync, ..MasterConfig::new(OWN) };
         lead(&config, &mut network, &told, &mut |state| states.push(state)).unwrap();
         (network.sent, states)
     }
@@ -257,7 +279,7 @@ mod tests {
         let mut request = head(0x1, 44, 5, 77);
         request[8..16].copy_from_slice(&(3_i64 << 16).to_be_bytes());
         let asked = 15 * SECOND + 123_456;
-        let (sent, states) = run(30, vec![(asked, 319, request)]);
+        let (sent, states) = run(30, LOG_SYNC, vec![(asked, 319, request)]);
         assert_eq!(states, [MasterState::Listening, MasterState::Master]);
         let began = sent[0].0;
         assert!(
@@ -267,6 +289,7 @@ mod tests {
 
         let announces = of_kind(&sent, 0xB);
         assert!(announces.iter().all(|(_, port, message)| *port == 320 && message.len() == 64));
+        assert!(announces.iter().all(|(.., message)| message[LOG_INTERVAL] == 1));
         assert!(announces.windows(2).all(|pair| pair[1].0 - pair[0].0 == 2 * SECOND), "{announces:?}");
         let (.., message) = announces.last().unwrap();
         // Priority 1, class, accuracy; priority 2, identity, steps; source.
@@ -295,14 +318,24 @@ mod tests {
     }
 
     #[test]
+    fn an_interval_that_is_asked_for_is_kept_and_told() {
+        let (sent, _) = run(30, -2, Vec::new());
+        let syncs = of_kind(&sent, 0x0);
+        assert!(syncs.windows(2).all(|pair| pair[1].0 - pair[0].0 == SECOND / 4));
+        let told =
+            [0x0, 0x8].map(|kind| of_kind(&sent, kind).iter().all(|(.., message)| message[33] == 0xFE));
+        assert_eq!(told, [true, true]);
+    }
+
+    #[test]
     fn a_better_clock_is_left_alone_while_it_is_heard() {
         let worse = |second: u64| (second * SECOND, 320, announce(1, 130, u16::try_from(second).unwrap()));
-        let (sent, states) = run(30, (1..30).map(worse).collect());
+        let (sent, states) = run(30, LOG_SYNC, (1..30).map(worse).collect());
         assert_eq!(states, [MasterState::Listening, MasterState::Master]);
         assert!(of_kind(&sent, 0x0).len() > 20, "a worse one is no reason to wait");
 
         let better = |second: u64| (second * SECOND, 320, announce(1, 100, u16::try_from(second).unwrap()));
-        let (sent, states) = run(50, (15..30).map(better).collect());
+        let (sent, states) = run(50, LOG_SYNC, (15..30).map(better).collect());
         let outranked = MasterState::Outranked { by: [1; 8] };
         let course = [MasterState::Listening, MasterState::Master, outranked, MasterState::Master];
         assert_eq!(states, course);

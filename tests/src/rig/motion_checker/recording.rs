@@ -26,7 +26,7 @@ use profile_sercos::wire::header::{FRAME_LEN_MAX, Header};
 
 use super::curve::{Curve, Skew};
 use super::follower::{self, Follower, Instant, Leader};
-use super::reading::{self, Scaling};
+use super::reading::{self, Reading, Scaling};
 use super::statistics::Statistics;
 use super::violation::{BusKind, Circumstances, Violation};
 use super::{NorthScale, value};
@@ -67,8 +67,8 @@ struct Axis {
     statistics: Statistics,
 }
 
-/// Judges the SERCOS axes in a recording of a box with this configuration, whose controller has this update period. `see` sees each
-/// update first.
+/// Judges the SERCOS axes in a recording of a box with this configuration, whose controller has this update period. `see` sees first
+/// what a drive has: the axis, from 0, the set-points that were judged of it so far, and the reading.
 ///
 /// # Errors
 /// The recording cannot be read.
@@ -79,7 +79,7 @@ pub fn judge(
     config: &Config,
     period: DurationNs,
     path: &Path,
-    mut see: impl FnMut(&mut Commanded),
+    mut see: impl FnMut(usize, u64, &mut Reading),
 ) -> Result<Judged, ReadError> {
     let sercos = config.sercos.as_ref().expect("a box with a SERCOS line");
     let device = config.devices.first().map_or(Ipv4Addr::UNSPECIFIED, |device| device.listen);
@@ -97,10 +97,7 @@ pub fn judge(
             Some(Side::North) => {
                 let Some((to_device, datagram)) = datagram(frame.data, device) else { continue };
                 if to_device {
-                    let Some(mut commanded) = updates::read(datagram, Format::Variable, None) else {
-                        continue;
-                    };
-                    see(&mut commanded);
+                    let Some(commanded) = updates::read(datagram, Format::Variable, None) else { continue };
                     axes.iter_mut().for_each(|axis| axis.take(at, period, &commanded));
                 } else if let Ok(datagram) = Class1Datagram::parse(datagram)
                     && let Ok(update) = ActualFrame::parse(datagram.data)
@@ -135,7 +132,9 @@ pub fn judge(
                     limit: None,
                 };
                 for (number, axis) in axes.iter_mut().enumerate() {
-                    let found = axis.look(line.network_mut(), &instant);
+                    let found = axis.look(line.network_mut(), &instant, |so_far, reading| {
+                        see(number, so_far, reading);
+                    });
                     violations.extend(found.into_iter().map(|found| {
                         let follower::Finding { rule, value, low, high } = found;
                         Violation {
@@ -194,6 +193,7 @@ impl Axis {
         &mut self,
         network: &axisbridge::simulate::drives::DriveNetwork,
         instant: &Instant,
+        see: impl FnOnce(u64, &mut Reading),
     ) -> Vec<follower::Finding> {
         let slave = &network.slaves()[self.place];
         if !self.runs {
@@ -201,13 +201,14 @@ impl Axis {
             self.scaling = reading::sercos_scaling(slave);
         }
         let reading = self.scaling.and_then(|scaling| Some((scaling, reading::sercos(slave, &scaling)?)));
-        let Some((scaling, reading)) = reading else {
+        let Some((scaling, mut reading)) = reading else {
             (self.mark, self.follower) = (None, Follower::default());
             return Vec::new();
         };
         if self.mark.replace(reading.mark) == Some(reading.mark) {
             return Vec::new();
         }
+        see(self.statistics.set_points, &mut reading);
         let leads = self.runs && instant.skew.synchronous;
         let leader = if leads { Leader::Controller } else { Leader::Other };
         let instant = Instant { limit: self.limit, ..*instant };
