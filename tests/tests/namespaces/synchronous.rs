@@ -414,7 +414,7 @@ fn a_controller_that_is_the_grandmaster_moves_the_axes_of_its_follower() {
         let mut tshark = plant.gateway.command("tshark");
         tshark.args(["-q", "-i", "net0", "-f", "udp port 319 or udp port 320", "-w"]).arg(&capture);
         let mut tshark = Running::start("tshark", tshark.stdout(Stdio::null()).stderr(Stdio::null()));
-        let mut follower = ptp4l(&plant.master, 130, "slaveOnly 1\nlogAnnounceInterval -1\n");
+        let mut follower = ptp4l(&plant.master, 130, "slaveOnly 1\nlogAnnounceInterval -1\nsummary_interval -4\nfreq_est_interval 0\n");
         // The clock of the controller's interface tells its time before the controller connects: a gateway without any takes the
         // first stamps of a connection for a step.
         let clock = ["--log-announce", "-1", "--log-sync", "-2", "--priority1", "120", "--clock-offset", "5"];
@@ -454,7 +454,7 @@ fn a_controller_that_is_the_grandmaster_moves_the_axes_of_its_follower() {
         let offsets: Vec<i64> = followed.lines().filter_map(offset).collect();
         let near =
             |expected: i64| offsets.iter().filter(|offset| (*offset + expected).abs() < 1_500_000).count();
-        assert!(near(5_000_000) >= 4, "5 ms ahead: {offsets:?}");
+        assert!(near(5_000_000) >= 3, "5 ms ahead: {offsets:?}: {followed}");
         assert!(near(25_000_000) >= 1, "and 20 ms more behind the step: {offsets:?}");
     });
 }
