@@ -115,7 +115,7 @@ struct Pace {
 const CIP_SYNC: Pace = Pace { log_announce: 1, log_sync: 0, phase: Duration::from_secs(60), motion: 420 };
 
 /// Four times as often, for a short test.
-const FAST: Pace = Pace { log_announce: -1, log_sync: -2, phase: Duration::from_secs(3), motion: 34 };
+const FAST: Pace = Pace { log_announce: -1, log_sync: -2, phase: Duration::from_secs(3), motion: 30 };
 
 /// A machine on the switch, at interface `net0`; behind the relay, `through` is its namespace.
 fn plug(switch: &Namespace, role: &str, address: &str) -> Namespace {
@@ -275,6 +275,8 @@ fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
         let intervals =
             format!("logAnnounceInterval {}\nlogSyncInterval {}\n", pace.log_announce, pace.log_sync);
         let mut master = ptp4l(&plant.master, 128, &intervals);
+        // A gateway without any time takes the first stamps of a connection for a step.
+        plant.wait_for_another("", "offsets are being measured");
         let time = ["--time", "ptp", "--time-threshold", "100"];
         let (mut controller, printed) = plant.controller(name, pace.motion, &time);
         wait_for_count(&plant.log, "-> Running", 2, &mut plant.run);
@@ -310,7 +312,7 @@ fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
 
         // Its clock steps in the phase behind the next one.
         let (announce, sync) = (pace.log_announce.to_string(), pace.log_sync.to_string());
-        let step_after = pace.phase.as_secs() + 12;
+        let step_after = pace.phase.as_secs() + 9;
         let step = format!("{step_after}:10");
         let arguments = [
             "simulate",
@@ -414,7 +416,11 @@ fn a_controller_that_is_the_grandmaster_moves_the_axes_of_its_follower() {
         let mut tshark = plant.gateway.command("tshark");
         tshark.args(["-q", "-i", "net0", "-f", "udp port 319 or udp port 320", "-w"]).arg(&capture);
         let mut tshark = Running::start("tshark", tshark.stdout(Stdio::null()).stderr(Stdio::null()));
-        let mut follower = ptp4l(&plant.master, 130, "slaveOnly 1\nlogAnnounceInterval -1\nsummary_interval -4\nfreq_est_interval 0\n");
+        let mut follower = ptp4l(
+            &plant.master,
+            130,
+            "slaveOnly 1\nlogAnnounceInterval -1\nsummary_interval -4\nfreq_est_interval 0\n",
+        );
         // The clock of the controller's interface tells its time before the controller connects: a gateway without any takes the
         // first stamps of a connection for a step.
         let clock = ["--log-announce", "-1", "--log-sync", "-2", "--priority1", "120", "--clock-offset", "5"];
@@ -422,8 +428,8 @@ fn a_controller_that_is_the_grandmaster_moves_the_axes_of_its_follower() {
         let mut first = Running::start("simulate grandmaster", first.args(clock).stdout(Stdio::null()));
         plant.wait_for_another("", "system time: synchronized");
         first.terminate(Duration::from_secs(10));
-        let time = [&["--time", "grandmaster", "--clock-step", "7:20"], &clock[..]].concat();
-        let (mut controller, printed) = plant.controller(name, 8, &time);
+        let time = [&["--time", "grandmaster", "--clock-step", "6:20"], &clock[..]].concat();
+        let (mut controller, printed) = plant.controller(name, 6, &time);
         let status = controller.wait(Duration::from_secs(60));
         let said = std::fs::read_to_string(&printed).unwrap_or_default();
         assert!(status.success(), "{status}: {said}\n{}", plant.text());
