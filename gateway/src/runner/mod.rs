@@ -59,7 +59,7 @@ use crate::sys::can_socket;
 use crate::sys::interface_lock::{InterfaceLock, LockError};
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
 use crate::time::object::time_sync;
-use crate::time::source::{Place, SourceError, TimeService};
+use crate::time::source::{Place, SourceError, TimeService, TimeView};
 
 /// How often the commissioning of drives that come later goes on.
 const COMMISSION_INTERVAL: Duration = Duration::from_millis(5);
@@ -161,7 +161,7 @@ pub struct RunningBox {
     /// Name and kind of each axis.
     axes: Vec<(String, AxisKind)>,
     /// Where system time comes from.
-    _time: TimeService,
+    time: TimeService,
     /// The socket of local control, removed at the end.
     _socket: Option<SocketFile>,
 }
@@ -336,7 +336,7 @@ pub fn start(
         stop_notices,
         restart,
         axes,
-        _time: time,
+        time,
         _socket: socket,
     })
 }
@@ -544,6 +544,12 @@ impl RunningBox {
     #[must_use]
     pub fn status(&self) -> BoxStatus {
         self.status.read()
+    }
+
+    /// The state of system time.
+    #[must_use]
+    pub fn time(&self) -> TimeView {
+        self.time.view()
     }
 
     /// What was refused of the asked-for real-time properties, in words; empty when everything was granted.

@@ -10,15 +10,16 @@
 
 use std::io;
 use std::net::Ipv4Addr;
-use std::sync::atomic::AtomicBool;
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use profile_generic::time::DurationNs;
 
 use super::super::progress::Progress;
 use super::super::{CliError, time};
-use super::{ADDRESS, Endpoints};
+use super::{ADDRESS, Endpoints, LOOK_INTERVAL};
+use crate::runner::RunningBox;
 use crate::simulate::clock::ClockPlan;
 use crate::simulate::controller_time::{ControllerTime, Leadership, PtpPlace, TimePlan};
 use crate::sys::namespace::{Namespace, run_ip};
@@ -121,6 +122,31 @@ impl Clocks {
         stop: &AtomicBool,
     ) -> Result<ControllerTime, CliError> {
         time::start(TimePlan::Ptp(place(), THRESHOLD), LIMIT, progress, stop)
+    }
+}
+
+/// Waits until the gateway has the grandmaster's time, so that the first time stamps of the controller mean something to it.
+pub fn wait_for_gateway(
+    running: &RunningBox,
+    progress: &mut Progress,
+    stop: &AtomicBool,
+) -> Result<(), CliError> {
+    let (view, end) = (running.time(), Instant::now() + LIMIT);
+    loop {
+        let status = view.read();
+        if status.sample.is_some() {
+            progress.step(&format!("time of the gateway: {status}"));
+            return Ok(());
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Err("ended before the gateway had the grandmaster's time".into());
+        }
+        if Instant::now() > end {
+            return Err(
+                format!("expected the grandmaster's time in the gateway within {LIMIT:?}: {status}").into()
+            );
+        }
+        std::thread::sleep(LOOK_INTERVAL);
     }
 }
 

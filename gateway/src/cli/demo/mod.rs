@@ -106,6 +106,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     };
     let outcome = match &clocks {
         Some(clocks) => clocks.controller.inside(|| {
+            clocks::wait_for_gateway(&running, &mut progress, &stop)?;
             let mut time = clocks.controller_time(&mut progress, &stop)?;
             let report = run(clocks::endpoints(), &mut time, &mut progress)?;
             progress.step(&format!("time of the controller: {}", time.description()));
