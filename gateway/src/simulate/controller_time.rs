@@ -74,7 +74,7 @@ pub enum ControllerTime {
     /// Its own clock, which it tells to others.
     Leading(ControllerClock, Grandmaster),
     /// The clock of a grandmaster.
-    Following(Following),
+    Following(Box<Following>),
 }
 
 /// See [`ControllerTime::Following`].
@@ -104,7 +104,7 @@ impl ControllerTime {
     pub fn start(plan: TimePlan) -> Result<Self, TimeError> {
         Ok(match plan {
             TimePlan::Host(plan) => Self::Own(ControllerClock::start(plan)),
-            TimePlan::Ptp(place, threshold) => Self::Following(Following::start(place, threshold)?),
+            TimePlan::Ptp(place, threshold) => Self::Following(Box::new(Following::start(place, threshold)?)),
             TimePlan::Grandmaster(place, leadership, plan) => {
                 let clock = ControllerClock::start(plan);
                 let Leadership { priorities, log_announce, log_sync } = leadership;

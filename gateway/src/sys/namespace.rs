@@ -96,7 +96,7 @@ mod tests {
         let (Ok(a), Ok(b)) = (Namespace::new(), Namespace::new()) else {
             return println!("SKIPPED: cannot make a network namespace");
         };
-        let [here, there] = [Ipv4Addr::new(192, 0, 2, 1), Ipv4Addr::new(192, 0, 2, 2)];
+        let [here, there] = [Ipv4Addr::new(198, 51, 100, 1), Ipv4Addr::new(198, 51, 100, 2)];
         let made = a.inside(|| {
             run_ip(&format!("link add net0 type veth peer name net1 netns {}", b.path()))?;
             run_ip(&format!("addr add {here}/24 dev net0"))

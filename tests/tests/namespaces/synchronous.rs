@@ -497,7 +497,7 @@ fn ptp_is_told_as_it_should(capture: &Path) {
         let words: Vec<&str> = line.split('\t').collect();
         let Ok(at) = words[0].parse::<f64>() else { continue };
         // Joining the group is no PTP.
-        if words[1] != "" {
+        if !words[1].is_empty() {
             kinds.entry(words[1]).or_default().push((at, words[2..].to_vec()));
         }
     }
