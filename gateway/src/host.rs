@@ -51,7 +51,9 @@ impl HostPort {
             .unwrap_or(Ipv4Addr::UNSPECIFIED);
         config.interface.host_name =
             fitting(self.file("proc/sys/kernel/hostname").unwrap_or_default().trim());
-        config.link.mac = self.of_port("address").and_then(|text| mac(&text)).unwrap_or([0; 6]);
+        // The files are those of the namespace that the process began in; the interface may be in another one.
+        let told = self.of_port("address").and_then(|text| mac(&text));
+        config.link.mac = told.or_else(|| interfaces::mac(&self.interface)).unwrap_or([0; 6]);
         config.link.interface_type = match self.number("type") {
             Some(TYPE_LOOPBACK) => InterfaceType::Internal,
             _ => InterfaceType::Unknown,

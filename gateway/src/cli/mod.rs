@@ -18,6 +18,7 @@ mod signal;
 mod simulate;
 mod snapshot;
 mod status;
+mod time;
 mod translate;
 
 use std::io::{self, Write as _};
@@ -25,9 +26,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{ArgGroup, Args, Parser, Subcommand};
-use profile_generic::time::DurationNs;
 
-use crate::simulate::clock::{ClockPlan, ClockStep};
+use self::time::{ClockArguments, GrandmasterArguments, LeadershipArguments, TimeArguments};
 
 /// Motion protocol gateway: a CIP Motion controller on one side, SERCOS III, CANopen and DeviceNet drives on the other.
 #[derive(Debug, Parser)]
@@ -81,6 +81,9 @@ struct DemoArguments {
     /// Buses of the two axes, separated by commas: the first axis is on the first bus. A third bus has a third axis.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES)]
     drives: Vec<demo::DriveKind>,
+    /// Time of controller and gateway. "ptp" needs root and `ip`.
+    #[arg(long, value_name = "SOURCE", value_enum, default_value_t)]
+    time: demo::DemoTime,
     /// Write the recording of both sides to this file.
     #[arg(long, value_name = "FILE", default_value = "axisbridge-demo.pcapng")]
     capture: PathBuf,
@@ -430,6 +433,8 @@ enum Simulate {
     DevicenetDrive(DevicenetDriveArguments),
     /// Simulate a CIP Motion controller that configures, enables and moves the axes of a device, or runs a script.
     Controller(ControllerArguments),
+    /// Simulate a PTP grandmaster with a clock of its own. No clock of the host is set.
+    Grandmaster(GrandmasterArguments),
 }
 
 /// Arguments of `simulate sercos-drive`.
@@ -559,28 +564,15 @@ struct ControllerArguments {
     /// How long the axes move, in seconds.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
     seconds: u32,
-    /// How far the controller's clock is ahead of the host's, in milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 0, allow_negative_numbers = true)]
-    clock_offset: i32,
-    /// What the controller's clock gains, in parts per million.
-    #[arg(long, value_name = "PPM", default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(-5_000..=5_000))]
-    clock_drift: i32,
-    /// After S seconds, step the controller's clock by MS milliseconds, such as 3:-50. Can be repeated.
-    #[arg(long, value_name = "S:MS")]
-    clock_step: Vec<ClockStep>,
+    #[command(flatten)]
+    time: TimeArguments,
+    #[command(flatten)]
+    leadership: LeadershipArguments,
+    #[command(flatten)]
+    clock: ClockArguments,
     /// Print the result as one JSON object on standard output.
     #[arg(long)]
     json: bool,
-}
-
-impl ControllerArguments {
-    fn clock(&self) -> ClockPlan {
-        ClockPlan {
-            offset: DurationNs::from_millis(self.clock_offset.into()),
-            drift_ppb: i64::from(self.clock_drift) * 1_000,
-            steps: self.clock_step.clone(),
-        }
-    }
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -611,6 +603,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(Simulate::CanDrive(arguments)) => simulate::can_drive(&arguments),
         Command::Simulate(Simulate::DevicenetDrive(arguments)) => simulate::devicenet_drive(&arguments),
         Command::Simulate(Simulate::Controller(arguments)) => simulate::controller(&arguments),
+        Command::Simulate(Simulate::Grandmaster(arguments)) => time::grandmaster(&arguments),
     };
     match result {
         Ok(code) => code,

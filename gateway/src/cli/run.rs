@@ -159,9 +159,14 @@ fn reload(path: &Path) -> Option<Box<Good>> {
     }
 }
 
-/// Logs to standard error; the environment variable `RUST_LOG` overrides the level of the file.
+/// Logs to standard error; the environment variable `RUST_LOG` overrides the level of the file. The PTP library has lines for each
+/// message, which nobody needs who does not ask for them.
 fn log_to_stderr(level: LogLevel) {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level.name()));
+    let own = match level {
+        LogLevel::Error => level.name().to_owned(),
+        level => format!("{},statime=warn", level.name()),
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(own));
     let logger =
         tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false);
     // A log file or a journal has no colours.

@@ -13,6 +13,7 @@ use profile_cip::controller::{Event, Report};
 use serde::Serialize;
 
 use super::progress::Progress;
+use super::simulate::controller_time;
 use super::{CliError, ControllerArguments, signal};
 use crate::mapping::Mapping;
 use crate::simulate::controller::{self, Endpoints};
@@ -35,13 +36,14 @@ pub fn run(arguments: &ControllerArguments, path: &Path) -> Result<ExitCode, Cli
     let Some(target) = arguments.target.or(script.places.target) else {
         return Ok(usage("no device: expected --target ADDR, or target = \"...\" in [connection]"));
     };
-    let bind = arguments.bind.or(script.places.bind).unwrap_or(Ipv4Addr::UNSPECIFIED);
+    let bind = arguments.bind.or(script.places.bind);
     let stop = signal::stop_on_signals()?;
     let mut teller = Teller::new(&script, &mapping, arguments.json);
-    let endpoints = Endpoints { target, bind, clock: arguments.clock() };
-    let steps = script.steps.clone();
+    let mut time = controller_time(arguments, bind, &mut teller.progress, &stop)?;
+    let endpoints = Endpoints { target, bind: bind.unwrap_or(Ipv4Addr::UNSPECIFIED) };
+    let (config, steps) = (script.config.clone(), script.steps.clone());
     let report =
-        controller::run(endpoints, script.config.clone(), steps, &stop, &mut |event| teller.tell(event))?;
+        controller::run(endpoints, config, &mut time, steps, &stop, &mut |event| teller.tell(event))?;
     let result = ScriptResult::new(&script, &report);
     if arguments.json {
         println!("{}", serde_json::to_string(&result)?);

@@ -28,6 +28,7 @@ use crate::simulate::can_actor::Actor;
 use crate::simulate::can_drive;
 use crate::simulate::can_process;
 use crate::simulate::controller::{self, Endpoints};
+use crate::simulate::controller_time::ControllerTime;
 use crate::simulate::devicenet_drive;
 use crate::simulate::drive_events::console::{Director, say, typed_lines};
 use crate::simulate::drive_events::{Names, Script};
@@ -242,6 +243,18 @@ fn end_after(stop: Arc<AtomicBool>, seconds: u64) {
     });
 }
 
+/// The time of a controller with the address `bind`, as soon as others share it.
+pub fn controller_time(
+    arguments: &ControllerArguments,
+    bind: Option<Ipv4Addr>,
+    progress: &mut Progress,
+    stop: &AtomicBool,
+) -> Result<ControllerTime, CliError> {
+    let ControllerArguments { time, leadership, clock, .. } = arguments;
+    let plan = super::time::plan(time, leadership, clock, bind)?;
+    super::time::start(plan, Duration::from_secs(time.limit.into()), progress, stop)
+}
+
 /// A CIP Motion controller that moves the axes of a device.
 pub fn controller(arguments: &ControllerArguments) -> Result<ExitCode, CliError> {
     if let Some(path) = &arguments.script {
@@ -264,12 +277,13 @@ pub fn controller(arguments: &ControllerArguments) -> Result<ExitCode, CliError>
         .collect();
     let mapping = Mapping::embedded()?;
     let config = setup::controller(&mapping, &axes, arguments.update_period_us);
-    let endpoints =
-        Endpoints { target, bind: arguments.bind.unwrap_or(Ipv4Addr::UNSPECIFIED), clock: arguments.clock() };
+    let endpoints = Endpoints { target, bind: arguments.bind.unwrap_or(Ipv4Addr::UNSPECIFIED) };
     let mut progress = Progress::new(arguments.json);
+    let mut time = controller_time(arguments, arguments.bind, &mut progress, &stop)?;
     let steps = program::standard(&plans, seconds);
-    let report =
-        controller::run(endpoints, config, steps, &stop, &mut |event| progress.step(&event.to_string()))?;
+    let report = controller::run(endpoints, config, &mut time, steps, &stop, &mut |event| {
+        progress.step(&event.to_string());
+    })?;
     let result =
         RunResult { axes: AxisResult::all(&plans, &report), capture: None, failure: failure(&report) };
     result.print(arguments.json)

@@ -161,7 +161,7 @@ pub struct RunningBox {
     /// Name and kind of each axis.
     axes: Vec<(String, AxisKind)>,
     /// Where system time comes from.
-    _time: TimeService,
+    time: TimeService,
     /// The socket of local control, removed at the end.
     _socket: Option<SocketFile>,
 }
@@ -338,7 +338,7 @@ pub fn start(
         stop_notices,
         restart,
         axes,
-        _time: time,
+        time,
         _socket: socket,
     })
 }
@@ -549,6 +549,12 @@ impl RunningBox {
     #[must_use]
     pub fn status(&self) -> BoxStatus {
         self.status.read()
+    }
+
+    /// The state of system time.
+    #[must_use]
+    pub fn time(&self) -> TimeView {
+        self.time.view()
     }
 
     /// What was refused of the asked-for real-time properties, in words; empty when everything was granted.

@@ -81,6 +81,13 @@ impl ControllerClock {
         self.changed(&HostTime.first_sample())
     }
 
+    /// Its system time at an instant of the host's monotonic clock that is just past.
+    #[must_use]
+    pub fn system_at(&self, host: MonotonicTime) -> SystemTime {
+        let now = HostTime.first_sample();
+        self.changed(&TimeSample { at: host, system: now.system - now.at.since(host), ..now }).system
+    }
+
     /// What the clock has gained at an instant of the host's monotonic clock.
     fn gained(&self, host: MonotonicTime) -> DurationNs {
         let gained = i128::from(host.since(self.begun).0) * i128::from(self.plan.drift_ppb) / BILLION;

@@ -1,5 +1,5 @@
 //! A CIP Motion controller on real sockets: the engine of `profile_cip::controller` with a TCP stream, a UDP socket and
-//! a clock of its own.
+//! a time of its own.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
@@ -13,7 +13,8 @@ use profile_cip::controller::{
 use profile_generic::time::DurationNs;
 use profile_generic::time_base::TimeBase;
 
-use super::clock::{ClockPlan, ControllerClock};
+use super::controller_time::ControllerTime;
+use super::setup::HOST_CLOCK;
 use crate::sys::realtime;
 use crate::sys::udp::{self, BindError, DSCP_URGENT, IoSocket, PORT_IO};
 
@@ -35,15 +36,13 @@ const PRIORITY: u8 = 10;
 /// Bytes taken from the stream at once.
 const STREAM_CHUNK: usize = 4096;
 
-/// Where the controller and its device are, and what time it has.
-#[derive(Debug, Clone)]
+/// Where the controller and its device are.
+#[derive(Debug, Clone, Copy)]
 pub struct Endpoints {
     /// The device; TCP 44818 and UDP 2222.
     pub target: Ipv4Addr,
     /// The controller's own address, to which it binds UDP 2222.
     pub bind: Ipv4Addr,
-    /// The controller's clock.
-    pub clock: ClockPlan,
 }
 
 /// Why a run could not begin or go on.
@@ -73,25 +72,33 @@ pub enum RunError {
     },
 }
 
-/// Runs `program` on the device to its end and returns the report. `on_event` sees every event as it comes; setting
-/// `stop` winds the run up early: the axes are stopped and disabled, the connection is closed.
+/// Runs `program` on the device to its end and returns the report. `clock` is the controller's time. `on_event` sees every
+/// event as it comes; setting `stop` winds the run up early: the axes are stopped and disabled, the connection is closed.
+///
+/// Where the configuration has the clock of the host for the grandmaster, Group_Sync is asked with that of `clock`.
 ///
 /// # Errors
 /// [`RunError`] when the run could not begin or a socket failed; how the program itself went stands in the report.
 pub fn run(
     endpoints: Endpoints,
-    config: ControllerConfig,
+    mut config: ControllerConfig,
+    clock: &mut ControllerTime,
     program: Vec<Step>,
     stop: &AtomicBool,
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Report, RunError> {
+    // One that a script names stays: it may be meant to be refused.
+    let is_named = config.grand_master != Some(HOST_CLOCK);
+    let mut grandmaster = clock.grandmaster();
+    if !is_named && grandmaster.is_some() {
+        config.grand_master = grandmaster;
+    }
     let mut controller = Controller::new(config, program)?;
     // A controller is a real-time device too; where the host refuses, its updates only come less evenly.
     let _ = realtime::apply(&realtime::Request { priority: Some(PRIORITY), ..realtime::Request::default() });
     let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
     let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
     let stream = connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
-    let clock = ControllerClock::start(endpoints.clock);
     let mut time = TimeBase::new(clock.first_sample());
     let mut buffer = [0_u8; if DATAGRAM_MAX > STREAM_CHUNK { DATAGRAM_MAX } else { STREAM_CHUNK }];
     let mut outgoing = Vec::with_capacity(STREAM_CHUNK);
@@ -105,6 +112,13 @@ pub fn run(
         if let Some(sample) = clock.sample() {
             // A step of the clock is told to the device with the controller's time offset.
             time.feed(&sample);
+        }
+        let followed = clock.grandmaster();
+        if followed != grandmaster {
+            grandmaster = followed;
+            if let Some(followed) = followed.filter(|_| !is_named) {
+                controller.set_grand_master(followed);
+            }
         }
         if stop.load(Ordering::Relaxed) && !stopping {
             stopping = true;

@@ -30,6 +30,19 @@ pub fn addresses() -> io::Result<Vec<InterfaceAddress>> {
     Ok(found.collect())
 }
 
+/// Name of the interface with this IPv4 address; `None` when there is none.
+#[must_use]
+pub fn name_of(address: Ipv4Addr) -> Option<String> {
+    addresses().ok()?.into_iter().find(|known| known.address == address).map(|known| known.name)
+}
+
+/// Hardware address of an interface of Ethernet; `None` for one without, or that is not there.
+#[must_use]
+pub fn mac(name: &str) -> Option<[u8; 6]> {
+    let of_link = |entry: nix::ifaddrs::InterfaceAddress| entry.address?.as_link_addr()?.addr();
+    getifaddrs().ok()?.filter(|entry| entry.interface_name == name).find_map(of_link)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -43,5 +56,8 @@ mod tests {
         };
         let all = addresses().unwrap();
         assert!(all.contains(&loopback), "{all:?}");
+        assert_eq!(name_of(Ipv4Addr::LOCALHOST).as_deref(), Some("lo"));
+        assert_eq!(name_of(Ipv4Addr::new(192, 0, 2, 255)), None);
+        assert_eq!((mac("lo"), mac("no-such")), (Some([0; 6]), None));
     }
 }

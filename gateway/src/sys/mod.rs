@@ -17,6 +17,7 @@ pub mod interface_lock;
 pub mod interfaces;
 pub mod launch;
 pub mod link;
+pub mod namespace;
 pub mod packet_socket;
 pub mod phc;
 pub mod ptp_socket;
@@ -25,6 +26,3 @@ pub mod udp;
 
 mod option;
 mod receive;
-
-#[cfg(test)]
-mod namespace;

@@ -1,4 +1,4 @@
-//! The sockets of a PTP follower: UDP 319 for event messages, with the kernel's stamps of receipt and sending, and UDP 320 for general
+//! The sockets of a PTP clock: UDP 319 for event messages, with the kernel's stamps of receipt and sending, and UDP 320 for general
 //! ones.
 //!
 //! The stamps are those of the kernel, taken in the driver or just above it. `CLOCK_REALTIME` is only between them and the monotonic
@@ -29,7 +29,7 @@ const GROUP: Ipv4Addr = Ipv4Addr::new(224, 0, 1, 129);
 /// How long the kernel may take to tell when a message left.
 const SENT_TIME_OUT: Duration = Duration::from_millis(20);
 
-/// Why the follower has no sockets.
+/// Why there are no sockets.
 #[derive(Debug, Error)]
 pub enum OpenError {
     /// There is no such interface.
@@ -64,6 +64,22 @@ pub enum OpenError {
     },
 }
 
+/// Code points that mark the messages, 0 to 63.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dscp {
+    /// Of event messages.
+    pub event: u8,
+    /// Of general messages.
+    pub general: u8,
+}
+
+impl Default for Dscp {
+    /// Those of CIP Sync.
+    fn default() -> Self {
+        Self { event: 59, general: 47 }
+    }
+}
+
 /// A message that came; its bytes are in the caller's buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Arrived {
@@ -81,21 +97,21 @@ pub struct PtpSockets {
 }
 
 impl PtpSockets {
-    /// Opens them on an interface; event messages are marked with a code point, 0 to 63.
+    /// Opens them on an interface; messages are marked with the code points of event and general messages, 0 to 63.
     ///
     /// # Errors
     /// [`OpenError`].
-    pub fn open(interface: &str, dscp: u8) -> Result<Self, OpenError> {
+    pub fn open(interface: &str, dscp: Dscp) -> Result<Self, OpenError> {
         let index = link::index(interface)
             .map_err(|_| OpenError::NoSuchInterface { interface: interface.to_owned() })?;
         let index = u32::try_from(index).unwrap_or(0);
-        let event = open(EVENT, index, dscp)?;
+        let event = open(EVENT, index, dscp.event)?;
         let system = |step| move |source| OpenError::System { port: EVENT, step, source };
         if !enable_time_stamps(event.as_fd()) {
             return Err(system("SO_TIMESTAMPNS")(io::Error::last_os_error()));
         }
         enable_sent_time_stamps(event.as_fd()).map_err(system("SO_TIMESTAMPING"))?;
-        Ok(Self { event, general: open(GENERAL, index, dscp)? })
+        Ok(Self { event, general: open(GENERAL, index, dscp.general)? })
     }
 
     /// Waits for a message until an instant at most.
@@ -124,6 +140,12 @@ impl PtpSockets {
             Ok(_) => self.sent(),
             Err(_) => Ok(None),
         }
+    }
+
+    /// Sends a general message to all.
+    pub fn send_general(&self, message: &[u8]) {
+        // One that could not be sent is no error, as a cable that was pulled comes back.
+        let _ = self.general.send_to(message, &SockAddr::from(SocketAddrV4::new(GROUP, GENERAL)));
     }
 
     /// A stamp that came too late is that of no message, and wakes everybody who waits.

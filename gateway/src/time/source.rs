@@ -32,7 +32,7 @@ use crate::simulate::setup::HOST_CLOCK;
 use crate::sys::clock::{self, KernelClock, monotonic_now};
 use crate::sys::ethtool;
 use crate::sys::phc::Phc;
-use crate::sys::ptp_socket::{OpenError, PtpSockets};
+use crate::sys::ptp_socket::{Dscp, OpenError, PtpSockets};
 
 /// How often the kernel is asked for the state of the host's clock.
 const LOOK: Duration = Duration::from_millis(250);
@@ -151,7 +151,8 @@ impl TimeService {
             TimeSource::Ptp => {
                 let interface = config.interface.clone().or_else(|| place.interface.clone());
                 let interface = interface.ok_or(SourceError::NoInterface)?;
-                let dscp = place.event_dscp;
+                // A follower sends no general message.
+                let dscp = Dscp { event: place.event_dscp, ..Dscp::default() };
                 let sockets = PtpSockets::open(&interface, dscp)?;
                 let control = Arc::clone(&control);
                 Some(spawn(move || run_follower(follower, &interface, dscp, sockets, &control, reporter))?)
@@ -199,7 +200,8 @@ fn spawn(run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, SourceEr
 }
 
 /// EUI-64 of a MAC address (IEEE 1588-2008, clause 7.5.2.2.2).
-fn identity(mac: [u8; 6]) -> [u8; 8] {
+#[must_use]
+pub const fn identity(mac: [u8; 6]) -> [u8; 8] {
     let [a, b, c, d, e, f] = mac;
     [a, b, c, 0xFF, 0xFE, d, e, f]
 }
@@ -243,7 +245,7 @@ impl Reporter {
 fn run_follower(
     config: FollowerConfig,
     interface: &str,
-    dscp: u8,
+    dscp: Dscp,
     first: PtpSockets,
     control: &Arc<Control>,
     mut reporter: Reporter,

@@ -138,6 +138,14 @@ impl Controller {
         &self.config
     }
 
+    /// The controller has another grandmaster from now on, bytes as in the Time Sync object: Group_Sync names it. A controller
+    /// that runs asynchronously goes on so.
+    pub fn set_grand_master(&mut self, grand_master: [u8; 8]) {
+        if let Some(known) = &mut self.config.grand_master {
+            *known = grand_master;
+        }
+    }
+
     /// Whether the run is over and everything is closed.
     #[must_use]
     pub fn is_closed(&self) -> bool {

@@ -8,6 +8,7 @@ mod masters;
 mod misbehaviour;
 mod ptp;
 mod sercos;
+mod synchronous;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -50,11 +50,17 @@ fn socket(priority: u8) -> PathBuf {
 
 /// A grandmaster in a namespace.
 fn grandmaster(namespace: &Namespace, priority: u8) -> Running {
+    ptp4l(namespace, priority, "logAnnounceInterval 1\nlogSyncInterval 0\n")
+}
+
+/// `ptp4l` in a namespace with these settings; its log is `ptp4l-PRIORITY.log`. It sets no clock (`free_running`): a slave would set
+/// that of the host, which all namespaces share.
+pub fn ptp4l(namespace: &Namespace, priority: u8, settings: &str) -> Running {
     let config = scratch(&format!("ptp4l-{priority}.conf"));
     let socket = socket(priority);
     let text = format!(
-        "[global]\ntime_stamping software\nnetwork_transport UDPv4\ndelay_mechanism E2E\nlogAnnounceInterval 1\n\
-         logSyncInterval 0\nlogMinDelayReqInterval 0\ndscp_event 59\ndscp_general 47\ntx_timestamp_timeout 50\n\
+        "[global]\ntime_stamping software\nfree_running 1\nnetwork_transport UDPv4\ndelay_mechanism E2E\n{settings}\
+         logMinDelayReqInterval 0\ndscp_event 59\ndscp_general 47\ntx_timestamp_timeout 50\n\
          priority1 {priority}\nuds_address {}\n",
         socket.display()
     );
@@ -276,7 +282,7 @@ fn time_sync_when_up(controller: &Namespace, python: &Path) -> Value {
 
 /// Waits until a text stands so often in the log of a box: a grandmaster takes ten seconds to become one, and the follower as long again
 /// to believe it.
-fn wait_for_count(log: &Path, text: &str, count: usize, process: &mut Running) {
+pub fn wait_for_count(log: &Path, text: &str, count: usize, process: &mut Running) {
     let end = std::time::Instant::now() + Duration::from_secs(60);
     loop {
         let seen = std::fs::read_to_string(log).unwrap_or_default();

@@ -55,6 +55,36 @@ fn both_axes_reach_their_targets(name: &str) {
     }
 }
 
+/// Grandmaster, controller and gateway as three clocks: the axes only move if Group_Sync finds the same grandmaster and no skew.
+#[test]
+#[ignore = "twenty seconds; namespaces/synchronous.rs has the same with each part in a process"]
+fn three_clocks_move_both_axes() {
+    let name = "three_clocks_move_both_axes";
+    if !peer::namespaces_or_skip(name) {
+        return;
+    }
+    let capture = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("demo-three-clocks.pcapng");
+    let demo = |more: &[&str]| {
+        let mut command = Command::new(axisbridge());
+        command.args(["demo", "--json", "--seconds", "2", "--time", "ptp", "--capture"]).arg(&capture);
+        command.args(more).output().expect("the demo can be started")
+    };
+    in_real_time(name, || {
+        let output = demo(&[]);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "the demo ended with {}: {errors}", output.status);
+        let result: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        let axes = result["axes"].as_array().expect("an array `axes`");
+        assert_eq!(axes.len(), 2);
+        for axis in axes {
+            assert!(axis["in_window"] == true && axis["target"].as_f64().unwrap() > 1.0, "{axis}");
+        }
+    });
+    let refused = demo(&["--listen", "127.0.0.9"]);
+    let errors = String::from_utf8_lossy(&refused.stderr);
+    assert!(!refused.status.success() && errors.contains("expected no --listen"), "{errors}");
+}
+
 /// Every frame of the recording, as tshark reads it, against what was meant.
 fn judge(capture: &Path) {
     let raw = frames(capture);

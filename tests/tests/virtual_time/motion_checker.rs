@@ -65,6 +65,43 @@ fn a_step_of_system_time_is_no_step_of_the_axis() {
     }
 }
 
+/// Nor is a step below the Step Threshold (class attribute 35, 1 ms), of both clocks one after the other: it is worked off by a
+/// thousandth of the time (clause 2-2.2).
+#[test]
+fn a_small_step_of_system_time_is_worked_off() {
+    const SLEW: f64 = 1.1e-3;
+    let worked_off = |found: &axisbridge_tests::rig::motion_checker::violation::Violation| {
+        let speed = [5.0, 200.0][found.axis];
+        let beyond = (found.value - found.high).max(found.low - found.value);
+        // In cycles of 2 ms, from one way to the other.
+        let allowed = match found.rule {
+            Rule::Velocity => SLEW * speed,
+            Rule::Acceleration => 2.0 * SLEW * speed / 0.002,
+            _ => 0.0,
+        };
+        beyond <= allowed
+    };
+    for (step, apart) in
+        [-101, 101, 300, -900].into_iter().flat_map(|step| [0, 1, 3, 40].map(|apart| (step, apart)))
+    {
+        for gateway_first in [true, false] {
+            let step = DurationNs::from_micros(step);
+            let mut rig = in_motion(Settings::default());
+            rig.motion_checker.tolerate("clause 2-2.2", worked_off);
+            for gateway in [gateway_first, !gateway_first] {
+                let now = rig.now();
+                if gateway {
+                    rig.gateway_clock.step(now, step);
+                } else {
+                    rig.controller_clock.step(now, step);
+                }
+                rig.run_for(millis(apart));
+            }
+            rig.run_for(millis(300));
+        }
+    }
+}
+
 /// M4: the targets of a controller that has got three periods ahead wait in an interpolator that has no room for them.
 #[test]
 fn a_controller_clock_that_is_ahead_is_served_or_refused() {

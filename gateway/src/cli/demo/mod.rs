@@ -2,8 +2,9 @@
 //!
 //! A CIP Motion controller on real TCP and UDP sockets, the box as `run` runs it, and behind it simulated drives inside the
 //! process, which get and give the very same frames as on a wire: of SERCOS III, of CANopen, of DeviceNet, or
-//! one of each.
+//! one of each. Controller and gateway read the host's clock, or are two clocks that follow a third one ([`clocks`]).
 
+mod clocks;
 mod drives;
 
 use std::net::Ipv4Addr;
@@ -12,7 +13,10 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+pub use self::clocks::DemoTime;
 pub use self::drives::{DRIVES, DriveKind, configuration};
+
+use self::clocks::Clocks;
 
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
@@ -23,6 +27,7 @@ use crate::runner::{self, RunningBox, StartError};
 use crate::settings::Store;
 use crate::simulate::clock::ClockPlan;
 use crate::simulate::controller::{self, Endpoints};
+use crate::simulate::controller_time::{ControllerTime, TimePlan};
 use crate::simulate::program::{self, AxisPlan};
 use crate::simulate::setup;
 use crate::status::BoxState;
@@ -53,7 +58,13 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(20);
 pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let [stop, hurry] = signal::stop_and_hurry_on_signals()?;
     let mut progress = Progress::new(arguments.json);
-    let text = drives::configuration(&arguments.drives).replace(ADDRESS, &arguments.listen.to_string());
+    let clocks = match arguments.time {
+        DemoTime::Host => None,
+        DemoTime::Ptp => Some(Clocks::start(arguments.listen, &mut progress)?),
+    };
+    let listen = clocks.as_ref().map_or(arguments.listen, |_| clocks::GATEWAY);
+    let text = drives::configuration(&arguments.drives).replace(ADDRESS, &listen.to_string());
+    let text = if clocks.is_some() { text.replace(clocks::SHARED, clocks::PTP) } else { text };
     let config = Config::parse(&text, "demo.toml")?;
     let mapping = Mapping::embedded()?;
     let seconds = f64::from(arguments.seconds);
@@ -65,33 +76,46 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let counts: Vec<_> = config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
 
     let settings = Arc::new(Store::open(None)?);
-    let running = runner::start(
-        &config,
-        mapping.clone(),
-        runner::Extras { capture: Some(&arguments.capture), local: None },
-        &settings,
-    )
-    .map_err(|error| in_use(error, arguments.listen))?;
+    let start = || {
+        let extras = runner::Extras { capture: Some(&arguments.capture), local: None };
+        runner::start(&config, mapping.clone(), extras, &settings).map_err(|error| in_use(error, listen))
+    };
+    let running = match &clocks {
+        Some(clocks) => clocks.gateway.inside(start)??,
+        None => start()?,
+    };
     progress.step(&format!(
-        "gateway on {}, {} simulated drives behind: {}",
-        arguments.listen,
+        "gateway on {listen}, {} simulated drives behind: {}",
         config.axes.len(),
         drives::title(&arguments.drives)
     ));
     wait_until_ready(&running, &mut progress)?;
 
-    let endpoints = endpoints(arguments.listen);
     let controller_config = setup::controller(&mapping, &counts, UPDATE_PERIOD_US);
     let steps = program::standard(&plans, seconds);
     let told = program::titles(&plans);
-    let outcome = controller::run(endpoints, controller_config, steps, &stop, &mut |event| {
-        use profile_cip::controller::Event;
-        match event {
-            Event::StepStarted { step } => progress.step(told.get(*step).map_or("", String::as_str)),
-            Event::StepFinished { .. } => {}
-            event => progress.step(&event.to_string()),
-        }
-    });
+    let run = |endpoints, time: &mut ControllerTime, progress: &mut Progress| {
+        controller::run(endpoints, controller_config, time, steps, &stop, &mut |event| {
+            use profile_cip::controller::Event;
+            match event {
+                Event::StepStarted { step } => progress.step(told.get(*step).map_or("", String::as_str)),
+                Event::StepFinished { .. } => {}
+                event => progress.step(&event.to_string()),
+            }
+        })
+    };
+    let outcome = match &clocks {
+        Some(clocks) => clocks.controller.inside(|| {
+            clocks::wait_for_gateway(&running, &mut progress, &stop)?;
+            let mut time = clocks.controller_time(&mut progress, &stop)?;
+            let report = run(clocks::endpoints(), &mut time, &mut progress)?;
+            progress.step(&format!("time of the controller: {}", time.description()));
+            Ok::<_, CliError>(report)
+        })?,
+        None => ControllerTime::start(TimePlan::Host(ClockPlan::default()))
+            .map_err(CliError::from)
+            .and_then(|mut time| Ok(run(endpoints(listen), &mut time, &mut progress)?)),
+    };
     let status = running.status();
     let stopped = running.stop(&|| hurry.load(Ordering::Relaxed))?;
     progress.step(&format!(
@@ -114,7 +138,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
 fn endpoints(listen: Ipv4Addr) -> Endpoints {
     let target = if listen.is_unspecified() { Ipv4Addr::new(127, 0, 0, 2) } else { listen };
     let [.., last] = target.octets();
-    Endpoints { target, bind: Ipv4Addr::new(127, 0, 1, last), clock: ClockPlan::default() }
+    Endpoints { target, bind: Ipv4Addr::new(127, 0, 1, last) }
 }
 
 fn wait_until_ready(running: &RunningBox, progress: &mut Progress) -> Result<(), CliError> {

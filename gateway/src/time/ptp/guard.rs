@@ -49,8 +49,9 @@ const STEPS_MAX: u16 = 255;
 /// First and last second that a clock may tell: corrections take none beyond the ends of 64 bit nanoseconds.
 const SECONDS: std::ops::Range<u64> = 2..9_000_000_000;
 
-mod kind {
+pub(super) mod kind {
     pub const SYNC: u8 = 0x0;
+    pub const DELAY_REQUEST: u8 = 0x1;
     pub const FOLLOW_UP: u8 = 0x8;
     pub const DELAY_RESPONSE: u8 = 0x9;
     pub const ANNOUNCE: u8 = 0xB;
@@ -68,7 +69,7 @@ pub enum Refusal {
     Version,
     /// Another domain.
     Domain,
-    /// A kind that a follower has no use for.
+    /// A kind that this clock has no use for.
     Kind,
     /// We have sent it.
     Own,
@@ -142,6 +143,8 @@ type Rank = (u8, [u8; 4], u8, [u8; 8], u16);
 pub struct Guard {
     own: [u8; 8],
     domain: u8,
+    /// The clock may be a master: it answers delay requests.
+    answers: bool,
     candidates: ArrayVec<Candidate, CANDIDATES>,
     /// Sender, sequence number and time of the last Sync that was passed on.
     sync: Option<([u8; 10], u16, MonotonicTime)>,
@@ -153,12 +156,13 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// Passes messages of a domain to the clock with this identity.
+    /// Passes messages of a domain to the follower with this identity.
     #[must_use]
     pub fn new(own: [u8; 8], domain: u8) -> Self {
         Self {
             own,
             domain,
+            answers: false,
             candidates: ArrayVec::new(),
             sync: None,
             window: MonotonicTime::ZERO,
@@ -166,6 +170,12 @@ impl Guard {
             preferred: 0,
             refused: [0; Refusal::ALL.len()],
         }
+    }
+
+    /// Passes messages of a domain to a clock that may be a master: delay requests too.
+    #[must_use]
+    pub fn of_master(own: [u8; 8], domain: u8) -> Self {
+        Self { answers: true, ..Self::new(own, domain) }
     }
 
     /// How many messages were refused for this reason.
@@ -233,6 +243,8 @@ impl Guard {
                 }
             }
             kind::ANNOUNCE => self.announce(message, sender, now)?,
+            // The time in a request says nothing.
+            kind::DELAY_REQUEST if self.answers => _ = part::<10>(message, HEADER_LEN)?,
             // Requests of other followers, and management, are for others.
             _ => return Err(Refusal::Kind),
         }

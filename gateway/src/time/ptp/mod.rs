@@ -1,11 +1,13 @@
-//! A follower of PTP, the profile of CIP Sync: IEEE 1588-2008 over UDP and IPv4, end-to-end delay, slave only.
+//! PTP in the profile of CIP Sync: IEEE 1588-2008 over UDP and IPv4, end-to-end delay. The box is a follower, slave only; a clock that
+//! may be the [`master`] is for the bench.
 //!
 //! `statime` has the protocol: parsing, best master, delay requests. Around it stand the [`guard`], which keeps from it what it
 //! cannot bear, and the [`Line`], which takes its measurements. Nothing sets a clock: the result is a line over the monotonic clock.
 //!
-//! [`follow`] runs until its [`Wire`] ends. The wire has the sockets and the time, so that a test has both in its hand.
+//! [`follow`] and [`master::lead`] run until their [`Wire`] ends. The wire has the sockets and the time, so that a test has both in its hand.
 
 pub mod guard;
+pub mod master;
 mod measured;
 #[cfg(test)]
 mod tests;
@@ -21,7 +23,7 @@ use statime::config::{
     TimePropertiesDS, TimeSource,
 };
 use statime::observability::port::PortState;
-use statime::port::{PortAction, PortActionIterator, TimestampContext};
+use statime::port::{NoForwardedTLVs, Port, PortAction, PortActionIterator, Running, TimestampContext};
 use statime::time::{Duration, Interval, Time};
 use statime::{PtpInstance, PtpInstanceState};
 
@@ -62,18 +64,27 @@ const ANNOUNCE_TIME_OUT: u8 = 3;
 /// Longest wait, so that silence is noticed, ns.
 const PATROL_NS: u64 = 250_000_000;
 
-type Instance = PtpInstance<Collector, std::cell::RefCell<PtpInstanceState>>;
+type State = std::cell::RefCell<PtpInstanceState>;
+type Instance = PtpInstance<Collector, State>;
+type RunningPort<'a> = Port<'a, Running, AcceptAnyMaster, StdRng, LocalClock, Collector, State>;
 
-/// Timers of the port, in the order of [`Timers::due`].
+/// Timers of the port, in the order of [`Timer::ALL`]. The last two are those of a master.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Timer {
     DelayRequest,
     AnnounceReceipt,
     BestMaster,
+    Announce,
+    Sync,
+}
+
+impl Timer {
+    const ALL: [Self; 5] =
+        [Self::DelayRequest, Self::AnnounceReceipt, Self::BestMaster, Self::Announce, Self::Sync];
 }
 
 #[derive(Debug, Default)]
-struct Timers([Option<MonotonicTime>; 3]);
+struct Timers([Option<MonotonicTime>; Timer::ALL.len()]);
 
 impl Timers {
     fn set(&mut self, timer: Timer, at: MonotonicTime) {
@@ -88,17 +99,17 @@ impl Timers {
 
     /// Takes a timer that has run off.
     fn due(&mut self, now: MonotonicTime) -> Option<Timer> {
-        [Timer::DelayRequest, Timer::AnnounceReceipt, Timer::BestMaster].into_iter().find(|timer| {
+        Timer::ALL.into_iter().find(|timer| {
             let place = self.0.get_mut(*timer as usize);
             place.is_some_and(|place| place.take_if(|at| *at <= now).is_some())
         })
     }
 }
 
-/// A delay request that has been sent, with the time it left.
+/// An event message that has been sent, with the time it left.
 type Sent = Option<(TimestampContext, MonotonicTime)>;
 
-/// Does what the port asks for; a delay request that left is returned.
+/// Does what the port asks for; an event message that left is returned.
 fn perform(
     actions: PortActionIterator<'_>,
     timers: &mut Timers,
@@ -112,7 +123,7 @@ fn perform(
     for action in actions {
         match action {
             PortAction::SendEvent { context, data, .. } => {
-                // Without the time it left there is no measurement; the next request has one.
+                // Without the time it left there is no measurement, or no Follow_Up; the next one has it.
                 sent = wire.send_event(data)?.map(|at| (context, at));
             }
             PortAction::ResetDelayRequestTimer { duration } => {
@@ -121,15 +132,144 @@ fn perform(
             PortAction::ResetAnnounceReceiptTimer { duration } => {
                 timers.set(Timer::AnnounceReceipt, later(duration))
             }
-            // Of a master, of filters with a time of their own, of boundary clocks.
-            PortAction::SendGeneral { .. }
-            | PortAction::ResetAnnounceTimer { .. }
-            | PortAction::ResetSyncTimer { .. }
-            | PortAction::ResetFilterUpdateTimer { .. }
-            | PortAction::ForwardTLV { .. } => {}
+            PortAction::SendGeneral { data, .. } => wire.send_general(data),
+            PortAction::ResetAnnounceTimer { duration } => timers.set(Timer::Announce, later(duration)),
+            PortAction::ResetSyncTimer { duration } => timers.set(Timer::Sync, later(duration)),
+            // Of filters with a time of their own, of boundary clocks.
+            PortAction::ResetFilterUpdateTimer { .. } | PortAction::ForwardTLV { .. } => {}
         }
     }
     Ok(sent)
+}
+
+/// What a clock is on the network.
+struct PortSettings {
+    instance: InstanceConfig,
+    log_announce: i8,
+    log_sync: i8,
+    /// By how much the way from the master is longer than the mean of both ways, ns.
+    asymmetry: i64,
+}
+
+impl PortSettings {
+    fn config(&self) -> PortConfig<AcceptAnyMaster> {
+        PortConfig {
+            acceptable_master_list: AcceptAnyMaster,
+            delay_mechanism: DelayMechanism::E2E { interval: Interval::from_log_2(LOG_DELAY_REQUEST) },
+            announce_interval: Interval::from_log_2(self.log_announce),
+            announce_receipt_timeout: ANNOUNCE_TIME_OUT,
+            sync_interval: Interval::from_log_2(self.log_sync),
+            master_only: false,
+            delay_asymmetry: Duration::from_nanos(self.asymmetry),
+            minor_ptp_version: PtpMinorVersion::Zero,
+        }
+    }
+}
+
+/// A port of the library with what it needs around it.
+struct ClockPort<'a> {
+    instance: &'a Instance,
+    /// Taken while the best master is chosen.
+    port: Option<RunningPort<'a>>,
+    timers: Timers,
+    guard: Guard,
+    clock: LocalClock,
+    measurements: measured::Measurements,
+    /// How often the best master is chosen, ns.
+    interval: u64,
+    buffer: [u8; MESSAGE_MAX],
+}
+
+impl<'a> ClockPort<'a> {
+    fn start(
+        instance: &'a Instance,
+        settings: &PortSettings,
+        seed: u64,
+        guard: Guard,
+        wire: &mut impl Wire,
+    ) -> io::Result<Self> {
+        let measurements = measured::Measurements::default();
+        let clock = LocalClock::new(wire.now());
+        let rng = StdRng::seed_from_u64(seed);
+        let port = instance.add_port(settings.config(), measurements.clone(), clock.clone(), rng);
+        let mut timers = Timers::default();
+        let (port, actions) = port.end_bmca();
+        perform(actions, &mut timers, wire, wire.now())?;
+        let interval = u64::try_from(instance.bmca_interval().as_nanos()).unwrap_or(u64::MAX);
+        timers.set(Timer::BestMaster, MonotonicTime(wire.now().0.saturating_add(interval)));
+        Ok(Self {
+            instance,
+            port: Some(port),
+            timers,
+            guard,
+            clock,
+            measurements,
+            interval,
+            buffer: [0; MESSAGE_MAX],
+        })
+    }
+
+    fn state(&self) -> Option<PortState> {
+        self.port.as_ref().map(|port| port.port_ds().port_state)
+    }
+
+    /// The master that is followed.
+    fn master(&self) -> Option<Master> {
+        let is_slave = self.state() == Some(PortState::Slave);
+        is_slave.then(|| {
+            let instance = self.instance;
+            Master::of(&instance.parent_ds(), &instance.time_properties_ds(), &instance.current_ds(None))
+        })
+    }
+
+    /// Waits for one message or timer and handles it. `time` is the time of the clock at an instant, as messages have it.
+    fn turn(
+        &mut self,
+        wire: &mut impl Wire,
+        time: &impl Fn(MonotonicTime) -> Time,
+    ) -> io::Result<MonotonicTime> {
+        let patrol = MonotonicTime(wire.now().0.saturating_add(PATROL_NS));
+        let until = self.timers.next().map_or(patrol, |at| at.min(patrol));
+        let arrived = wire.wait(until, &mut self.buffer)?;
+        let now = wire.now();
+        self.clock.set(now);
+        let Some(mut port) = self.port.take() else { return Ok(now) };
+        let timers = &mut self.timers;
+        let sent = if let Some(Arrived { len, event }) = arrived {
+            match (self.guard.pass(self.buffer.get(..len).unwrap_or(&[]), now), event) {
+                (Ok(message), Some(at)) => {
+                    perform(port.handle_event_receive(message, time(at)), timers, wire, now)?
+                }
+                (Ok(message), None) => perform(port.handle_general_receive(message), timers, wire, now)?,
+                (Err(_), _) => None,
+            }
+        } else {
+            match timers.due(now) {
+                Some(Timer::DelayRequest) => perform(port.handle_delay_request_timer(), timers, wire, now)?,
+                Some(Timer::AnnounceReceipt) => {
+                    perform(port.handle_announce_receipt_timer(), timers, wire, now)?
+                }
+                Some(Timer::BestMaster) => {
+                    let mut deciding = port.start_bmca();
+                    self.instance.bmca(&mut [&mut deciding]);
+                    let (running, actions) = deciding.end_bmca();
+                    port = running;
+                    timers.set(Timer::BestMaster, MonotonicTime(now.0.saturating_add(self.interval)));
+                    perform(actions, timers, wire, now)?
+                }
+                Some(Timer::Announce) => {
+                    perform(port.handle_announce_timer(&mut NoForwardedTLVs), timers, wire, now)?
+                }
+                Some(Timer::Sync) => perform(port.handle_sync_timer(), timers, wire, now)?,
+                None => None,
+            }
+        };
+        if let Some((context, at)) = sent {
+            perform(port.handle_send_timestamp(context, time(at)), timers, wire, now)?;
+        }
+        self.port = Some(port);
+        Ok(now)
+    }
 }
 
 /// Follows the best master until the wire ends. `report` gets the status after each change.
@@ -141,8 +281,8 @@ pub fn follow(
     wire: &mut impl Wire,
     report: &mut dyn FnMut(&TimeStatus),
 ) -> io::Result<()> {
-    let instance = Instance::new(
-        InstanceConfig {
+    let settings = PortSettings {
+        instance: InstanceConfig {
             clock_identity: ClockIdentity(config.identity),
             priority_1: 255,
             priority_2: 255,
@@ -151,84 +291,34 @@ pub fn follow(
             sdo_id: SdoId::default(),
             path_trace: false,
         },
-        TimePropertiesDS::new_arbitrary_time(false, false, TimeSource::InternalOscillator),
-    );
-    let collector = measured::Measurements::default();
-    let clock = LocalClock::new(wire.now());
-    let port_config = PortConfig {
-        acceptable_master_list: AcceptAnyMaster,
-        delay_mechanism: DelayMechanism::E2E { interval: Interval::from_log_2(LOG_DELAY_REQUEST) },
-        announce_interval: Interval::from_log_2(LOG_ANNOUNCE),
-        announce_receipt_timeout: ANNOUNCE_TIME_OUT,
-        sync_interval: Interval::from_log_2(LOG_SYNC),
-        master_only: false,
-        delay_asymmetry: Duration::from_nanos(config.asymmetry),
-        minor_ptp_version: PtpMinorVersion::Zero,
+        log_announce: LOG_ANNOUNCE,
+        log_sync: LOG_SYNC,
+        asymmetry: config.asymmetry,
     };
-    let port =
-        instance.add_port(port_config, collector.clone(), clock.clone(), StdRng::seed_from_u64(config.seed));
-    let mut timers = Timers::default();
-    let (mut port, actions) = port.end_bmca();
-    perform(actions, &mut timers, wire, wire.now())?;
-    let interval = u64::try_from(instance.bmca_interval().as_nanos()).unwrap_or(u64::MAX);
-    timers.set(Timer::BestMaster, MonotonicTime(wire.now().0.saturating_add(interval)));
-
-    let mut guard = Guard::new(config.identity, config.domain);
+    let instance = Instance::new(settings.instance, time_properties());
+    let guard = Guard::new(config.identity, config.domain);
+    let mut port = ClockPort::start(&instance, &settings, config.seed, guard, wire)?;
     let mut follower = Follower::new(config);
-    let mut buffer = [0; MESSAGE_MAX];
-    report(follower.status(wire.now(), &guard));
+    report(follower.status(wire.now(), &port.guard));
     while !wire.is_ended() {
-        let patrol = MonotonicTime(wire.now().0.saturating_add(PATROL_NS));
-        let until = timers.next().map_or(patrol, |at| at.min(patrol));
-        let arrived = wire.wait(until, &mut buffer)?;
-        let now = wire.now();
-        clock.set(now);
-        let sent = if let Some(Arrived { len, event }) = arrived {
-            match (guard.pass(buffer.get(..len).unwrap_or(&[]), now), event) {
-                (Ok(message), Some(at)) => {
-                    perform(port.handle_event_receive(message, time(at)), &mut timers, wire, now)?
-                }
-                (Ok(message), None) => perform(port.handle_general_receive(message), &mut timers, wire, now)?,
-                (Err(_), _) => None,
-            }
-        } else {
-            match timers.due(now) {
-                Some(Timer::DelayRequest) => {
-                    perform(port.handle_delay_request_timer(), &mut timers, wire, now)?
-                }
-                Some(Timer::AnnounceReceipt) => {
-                    perform(port.handle_announce_receipt_timer(), &mut timers, wire, now)?
-                }
-                Some(Timer::BestMaster) => {
-                    let mut deciding = port.start_bmca();
-                    instance.bmca(&mut [&mut deciding]);
-                    let (running, actions) = deciding.end_bmca();
-                    port = running;
-                    timers.set(Timer::BestMaster, MonotonicTime(now.0.saturating_add(interval)));
-                    perform(actions, &mut timers, wire, now)?
-                }
-                None => None,
-            }
-        };
-        if let Some((context, at)) = sent {
-            perform(port.handle_send_timestamp(context, time(at)), &mut timers, wire, now)?;
-        }
-        let parent = instance.parent_ds();
-        let is_slave = port.port_ds().port_state == PortState::Slave;
-        let master =
-            is_slave.then(|| Master::of(&parent, &instance.time_properties_ds(), &instance.current_ds(None)));
-        follower.master(master, now);
-        while let Some(measured) = collector.take() {
+        let now = port.turn(wire, &time)?;
+        follower.master(port.master(), now);
+        while let Some(measured) = port.measurements.take() {
             follower.measured(measured);
         }
         if wire.take_forget() {
             follower.forget();
         }
         if follower.pass(now) {
-            report(follower.status(now, &guard));
+            report(follower.status(now, &port.guard));
         }
     }
     Ok(())
+}
+
+/// A clock that nobody has set by a standard.
+fn time_properties() -> TimePropertiesDS {
+    TimePropertiesDS::new_arbitrary_time(false, false, TimeSource::InternalOscillator)
 }
 
 fn time(at: MonotonicTime) -> Time {

@@ -183,6 +183,10 @@ impl Wire for Network {
         Ok(Some(MonotonicTime(left)))
     }
 
+    fn send_general(&mut self, message: &[u8]) {
+        panic!("a follower sends no general message: {message:?}");
+    }
+
     fn is_ended(&self) -> bool {
         self.now >= self.end
     }

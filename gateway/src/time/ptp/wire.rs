@@ -1,4 +1,4 @@
-//! Where the follower gets its messages and the time from.
+//! Where a clock of PTP gets its messages and the time from.
 
 use std::io;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ pub use crate::sys::ptp_socket::Arrived;
 use crate::sys::clock::monotonic_now;
 use crate::sys::ptp_socket::PtpSockets;
 
-/// Sockets and clock of a follower.
+/// Sockets and oscillator of a clock.
 pub trait Wire {
     /// The monotonic time.
     fn now(&self) -> MonotonicTime;
@@ -28,7 +28,10 @@ pub trait Wire {
     /// What the socket says.
     fn send_event(&mut self, message: &[u8]) -> io::Result<Option<MonotonicTime>>;
 
-    /// Whether the follower is to end.
+    /// Sends a general message to all. One that is lost is no error: the next one comes.
+    fn send_general(&mut self, message: &[u8]);
+
+    /// Whether the clock is to end.
     fn is_ended(&self) -> bool;
 
     /// Whether the largest offset is to begin anew, once.
@@ -37,12 +40,12 @@ pub trait Wire {
     }
 }
 
-/// What a follower is told while it runs.
+/// What a clock is told while it runs.
 #[derive(Debug, Default)]
 pub struct Control {
     /// It ends.
     pub stop: AtomicBool,
-    /// The domain that it follows.
+    /// Its domain.
     pub domain: AtomicU8,
     /// The largest offset begins anew.
     pub forget: AtomicBool,
@@ -53,9 +56,9 @@ pub struct Control {
 pub struct HostWire {
     /// They are open.
     pub sockets: PtpSockets,
-    /// The domain that is followed.
+    /// The domain of the clock.
     pub domain: u8,
-    /// What the follower is told.
+    /// What the clock is told.
     pub control: Arc<Control>,
 }
 
@@ -72,7 +75,11 @@ impl Wire for HostWire {
         self.sockets.send_event(message)
     }
 
-    /// A follower has one domain: for another one it begins anew.
+    fn send_general(&mut self, message: &[u8]) {
+        self.sockets.send_general(message);
+    }
+
+    /// A clock has one domain: for another one it begins anew.
     fn is_ended(&self) -> bool {
         self.control.stop.load(Ordering::Relaxed)
             || self.control.domain.load(Ordering::Relaxed) != self.domain

@@ -14,6 +14,8 @@
 //! | moves by its drive: homing, positioning, halt | are not looked at |
 //! | whatever it does | are no faster than `limits.velocity`, with a tenth to spare |
 //!
+//! What was recorded of a box in real time is judged by the same rules ([`recording`]).
+//!
 //! A violation ends the test, unless the test has declared it ([`MotionChecker::allow`]) or it is of a finding that is
 //! not mended yet ([`known`]).
 
@@ -22,6 +24,7 @@ pub mod follower;
 pub mod grid;
 pub mod known;
 pub mod reading;
+pub mod recording;
 pub mod statistics;
 pub mod violation;
 
