@@ -379,9 +379,8 @@ impl Engine {
             }
             let by = lock.correct(clock.trusted(), next, span, torque);
             bus.shift_grid(by);
-            let phase = lock.phase();
-            if phase.state != before {
-                push(notices, Notice::PhaseLock { bus: buses.name(place), phase });
+            if lock.is_news(before) {
+                push(notices, Notice::PhaseLock { bus: buses.name(place), phase: lock.phase() });
             }
         }
     }

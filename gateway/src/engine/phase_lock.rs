@@ -101,6 +101,13 @@ impl PhaseLock {
         self.phase
     }
 
+    /// Whether its state is news after `before`: a bus that is on the grid already needs no pull.
+    #[must_use]
+    pub fn is_news(&self, before: LockState) -> bool {
+        let Phase { state, error } = self.phase;
+        state != before && (state != LockState::Pulling || error.magnitude() > LOCKED.magnitude())
+    }
+
     /// The grid of the controller of this bus, whose cycle is `span`; the last one stays when it is gone.
     pub fn refer(&mut self, grid: Grid, span: DurationNs) {
         let whole = span.0 > 0 && grid.period.0 >= span.0 && grid.period.0 % span.0 == 0;
@@ -249,6 +256,22 @@ mod tests {
         assert_eq!(lock.phase(), Phase { state: LockState::Pulling, error: DurationNs(5_001) });
         run(&mut lock, &time, next, 17 + 100);
         assert_eq!(lock.phase().state, LockState::Locked);
+    }
+
+    #[test]
+    fn news_are_a_lock_its_end_and_a_pull_that_has_something_to_do() {
+        let (mut lock, time) = (PhaseLock::default(), time());
+        let mut next = |lock: &mut PhaseLock, at: u64, time: Option<&TimeBase>| {
+            let before = lock.phase().state;
+            lock.correct(time, Some(MonotonicTime(at)), SPAN, false);
+            lock.is_news(before)
+        };
+        assert!(!next(&mut lock, 0, Some(&time)), "on the grid by chance");
+        assert!((0..98).all(|_| !next(&mut lock, 0, Some(&time))));
+        assert!(next(&mut lock, 0, Some(&time)), "locked");
+        assert!(next(&mut lock, 6_000, Some(&time)), "off the grid");
+        assert!(next(&mut lock, 0, None), "free");
+        assert!(next(&mut lock, 2_000, Some(&time)), "to be pulled");
     }
 
     #[test]

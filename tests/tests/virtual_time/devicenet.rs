@@ -7,6 +7,7 @@ use axisbridge::simulate::devicenet_drive::DevicenetNode;
 use axisbridge::simulate::program::{self, AxisPlan};
 use axisbridge::status::BoxState;
 use axisbridge_tests::rig::motion::{NANO, both, millis};
+use axisbridge_tests::rig::motion_checker::violation::Rule;
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{AxisSet, Limits, Step};
 use profile_cip::devicenet::wire::{DuplicateMac, Identifier, MacId};
@@ -374,6 +375,10 @@ fn a_box_that_is_bus_off_stops_both_axes_and_leads_them_again_when_it_is_back() 
         Step::MoveRelative { axis: 2, distance: 48.0, limits: SLIDE },
         Step::Disable(both()),
     ];
+    // Where an axis stands between two counts of its drive, the first set-points round to either: two counts of the slide in a cycle.
+    rig.motion_checker.tolerate("counts of the controller and the drive that do not coincide", |violation| {
+        violation.axis == 1 && violation.rule == Rule::Velocity && violation.value.abs() < 0.002
+    });
     connect(&mut rig, program);
     rig.run_until(millis(10_000), "both in motion", |rig| turntable_turns(rig) && slide_moves(rig));
     let report = rig.run(millis(30_000));

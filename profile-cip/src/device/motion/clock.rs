@@ -84,7 +84,7 @@ impl Clock {
         };
         let status = match (self.sync.grandmaster, system_time) {
             (Some(ours), _) if ours != grandmaster => SyncStatus::DIFFERENT_GRANDMASTER,
-            (Some(_), Some(system_time)) if self.sync.synchronized => self.judge_skew(system_time, received),
+            (Some(_), Some(system_time)) if self.sync.synchronized => Self::judge_skew(system_time, received),
             _ => SyncStatus::NOT_SYNCHRONIZED,
         };
         if status == SyncStatus::SYNCHRONIZED {
@@ -93,10 +93,10 @@ impl Clock {
         (GeneralStatus::SUCCESS, status)
     }
 
-    fn judge_skew(&self, system_time: u64, received: Option<(Option<u64>, u64)>) -> SyncStatus {
+    /// The stamp counts as it came: with Group_Sync both clocks are to agree, and what was compensated before ends.
+    fn judge_skew(system_time: u64, received: Option<(Option<u64>, u64)>) -> SyncStatus {
         let Some((time_stamp, period)) = received else { return SyncStatus::NOT_SYNCHRONIZED };
-        let skewed =
-            time_stamp.is_some_and(|stamp| Self::is_skewed(self.compensate(stamp), period, system_time));
+        let skewed = time_stamp.is_some_and(|stamp| Self::is_skewed(stamp, period, system_time));
         if skewed { SyncStatus::CLOCK_SKEW } else { SyncStatus::SYNCHRONIZED }
     }
 
@@ -116,6 +116,21 @@ mod tests {
     use super::*;
 
     const PERIOD: u64 = 1_000_000;
+
+    /// A controller that connects before the device has any time: its first time is a step of years, which the compensation holds.
+    #[test]
+    fn device_that_gets_its_time_behind_the_connection_passes_group_sync() {
+        let (epoch, now) = (1_700_000_000_000_000_000_u64, 50 * PERIOD);
+        let mut clock = Clock::default();
+        clock.set(SyncState { grandmaster: Some([7; 8]), synchronized: false, offset: 0 });
+        clock.update(epoch, 1_000_000, PERIOD);
+        clock.set(SyncState { grandmaster: Some([7; 8]), synchronized: true, offset: epoch.cast_signed() });
+        clock.update(epoch, 1_000_000, PERIOD);
+        let received = Some((Some(epoch + now - PERIOD), PERIOD));
+        let (_, status) = clock.group_sync(&[7; 8], Some(epoch + now), received, epoch);
+        assert_eq!(status, SyncStatus::SYNCHRONIZED);
+        assert_eq!(clock.compensate(epoch + now), epoch + now, "and from then on stamps are what they are");
+    }
 
     #[test]
     fn group_sync_needs_the_same_grandmaster_a_synchronized_clock_and_a_stamp_without_skew() {
