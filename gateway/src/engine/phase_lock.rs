@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn news_are_a_lock_its_end_and_a_pull_that_has_something_to_do() {
         let (mut lock, time) = (PhaseLock::default(), time());
-        let mut next = |lock: &mut PhaseLock, at: u64, time: Option<&TimeBase>| {
+        let next = |lock: &mut PhaseLock, at: u64, time: Option<&TimeBase>| {
             let before = lock.phase().state;
             lock.correct(time, Some(MonotonicTime(at)), SPAN, false);
             lock.is_news(before)
