@@ -17,5 +17,6 @@ pub mod controller;
 pub mod device;
 pub mod devicenet;
 mod generated;
+mod reported;
 mod time_offset;
 pub mod wire;

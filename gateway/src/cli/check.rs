@@ -1,11 +1,10 @@
 //! `axisbridge check`: reads tables, overlays and a configuration, and reports everything that is wrong with them.
 
 use std::fmt::Write as _;
-use std::io::IsTerminal as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use super::{CheckArguments, CheckFormat, CliError, print};
+use super::{CheckArguments, CheckFormat, CliError, has_colours, print};
 use crate::check::{Outcome, Request, check, schema};
 use crate::finding::registry::{self, Code, REGISTRY};
 use crate::finding::{Finding, Findings, Severity, json_report, sarif_report};
@@ -107,9 +106,7 @@ fn changes(
 
 /// The findings one after the other, with colours on a terminal.
 fn shown(arguments: &CheckArguments, findings: &Findings) -> String {
-    let colours =
-        std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    findings.shown(colours, |found| arguments.notes || found.asks())
+    findings.shown(has_colours(&std::io::stdout()), |found| arguments.notes || found.asks())
 }
 
 /// A schema, or the names of all.

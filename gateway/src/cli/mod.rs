@@ -21,7 +21,7 @@ mod status;
 mod time;
 mod translate;
 
-use std::io::{self, Write as _};
+use std::io::{self, IsTerminal, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -616,6 +616,11 @@ pub fn main() -> ExitCode {
 
 /// An error as the person at the terminal reads it.
 type CliError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Whether output has colours: on a terminal, unless the person there wants none.
+fn has_colours(stream: &impl IsTerminal) -> bool {
+    stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
 
 /// Prints data; the command then ends with `code`.
 fn print(data: impl AsRef<[u8]>, code: ExitCode) -> Result<ExitCode, CliError> {

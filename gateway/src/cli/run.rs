@@ -10,7 +10,7 @@ use std::time::Duration;
 use tracing::{error, info, warn};
 use tracing_subscriber::EnvFilter;
 
-use super::{CliError, RunArguments};
+use super::{CliError, RunArguments, has_colours};
 use crate::check::{Request, check};
 use crate::config::{Config, LogLevel};
 use crate::finding::{Finding, Findings, Severity};
@@ -77,9 +77,7 @@ fn read(path: &Path) -> Result<(Good, Findings), Findings> {
 
 /// Why the files are refused, with what else asks for something; notes on tables as they are shipped are for `check`.
 fn refusal(findings: &Findings) -> String {
-    let colours =
-        std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    findings.shown(colours, Finding::asks)
+    findings.shown(has_colours(&std::io::stderr()), Finding::asks)
 }
 
 /// Logs warnings; notes are for `check`.

@@ -221,7 +221,7 @@ fn when_up<S, E>(
 }
 
 /// A flag that a signal sets, or the time that the process was given.
-fn stop_after(seconds: Option<u64>) -> Result<Arc<AtomicBool>, CliError> {
+pub(super) fn stop_after(seconds: Option<u64>) -> Result<Arc<AtomicBool>, CliError> {
     let stop = signal::stop_on_signals()?;
     if let Some(seconds) = seconds {
         end_after(Arc::clone(&stop), seconds);

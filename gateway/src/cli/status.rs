@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use super::{CliError, StatusArguments, print, signal, written_to_end};
+use super::{CliError, StatusArguments, has_colours, print, signal, written_to_end};
 use crate::local::overview::{Axis, FORMAT, Overview};
 
 /// How often `--watch` asks.
@@ -27,7 +27,7 @@ const CLEAR: &str = "\x1b[H\x1b[2J";
 pub fn run(arguments: &StatusArguments) -> Result<ExitCode, CliError> {
     let mut client = Client::connect(&arguments.local)?;
     let terminal = std::io::stdout().is_terminal();
-    let colours = terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let colours = has_colours(&std::io::stdout());
     if !arguments.watch {
         let (json, overview) = client.ask()?;
         let text = if arguments.json { format!("{json}\n") } else { text(&overview, colours) };
@@ -107,8 +107,7 @@ fn text(overview: &Overview, colours: bool) -> String {
     };
     let Overview { name, state, cycles, time, .. } = overview;
     let mut out = String::new();
-    let up = state == "ready" || state == "running";
-    let _ = write!(out, "{name}: {}", paint(state, up));
+    let _ = write!(out, "{name}: {}", paint(state, overview.is_up()));
     if let Some(phase) = overview.sercos_phase {
         let _ = write!(out, ", SERCOS CP{phase}");
     }

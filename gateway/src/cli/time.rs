@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use profile_generic::time::DurationNs;
 
+use super::CliError;
 use super::progress::Progress;
-use super::{CliError, signal};
+use super::simulate::stop_after;
 use crate::simulate::clock::{ClockPlan, ClockStep};
 use crate::simulate::controller_time::{ControllerTime, Leadership, PtpPlace, Readiness, TimePlan};
 use crate::sys::interfaces;
@@ -195,13 +196,12 @@ pub fn start(
 /// # Errors
 /// No sockets, or it has ended by itself.
 pub fn grandmaster(arguments: &GrandmasterArguments) -> Result<ExitCode, CliError> {
-    let stop = signal::stop_on_signals()?;
+    let stop = stop_after(arguments.seconds)?;
     let place = PtpPlace { interface: arguments.interface.clone(), domain: arguments.domain };
     let plan = TimePlan::Grandmaster(place, arguments.leadership.leadership(), arguments.clock.plan());
     let mut time = ControllerTime::start(plan)?;
-    let end = arguments.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
     let mut said = None;
-    while !stop.load(Ordering::Relaxed) && end.is_none_or(|end| Instant::now() < end) {
+    while !stop.load(Ordering::Relaxed) {
         time.readiness()?;
         let description = time.description();
         if said.as_ref() != Some(&description) {

@@ -71,7 +71,7 @@ pub struct Cycles {
 pub struct Time {
     /// The `source` of the configuration.
     pub source: String,
-    /// Whether controllers are told that it is synchronized.
+    /// Whether IsSynchronized is reported to controllers.
     pub synchronized: bool,
     /// In words, as the log has it.
     pub state: String,
@@ -114,7 +114,7 @@ pub struct Axis {
     pub following_error: f64,
     /// The fault that stands.
     pub fault: Option<String>,
-    /// The drive's own code of it; 0 if it has told none.
+    /// The drive's own code of it; 0 if it has reported none.
     pub drive_code: u32,
     /// What the axis has waited for, for longer than a second, in words.
     pub waits: Option<String>,
@@ -167,12 +167,17 @@ impl Overview {
         }
     }
 
+    /// Whether all buses are in cyclic operation.
+    #[must_use]
+    pub fn is_up(&self) -> bool {
+        [BoxState::READY, BoxState::RUNNING].iter().any(|state| self.state == state.to_string())
+    }
+
     /// Whether all is well: the buses are up, no axis has a fault, and time is synchronized if there is to be one.
     #[must_use]
     pub fn is_healthy(&self) -> bool {
-        let up = [BoxState::READY, BoxState::RUNNING].iter().any(|state| self.state == state.to_string());
         let timed = self.time.synchronized || self.time.source == TimeSource::None.name();
-        up && timed && self.axes.iter().all(|axis| axis.fault.is_none())
+        self.is_up() && timed && self.axes.iter().all(|axis| axis.fault.is_none())
     }
 }
 

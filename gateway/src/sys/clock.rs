@@ -49,15 +49,18 @@ pub fn realtime_now() -> KernelTime {
 /// An instant of the monotonic clock on the clock of TAI, for instants around now.
 #[must_use]
 pub fn tai_of(at: MonotonicTime) -> KernelTime {
-    let (now, tai) = (monotonic_now(), read(ClockId::Tai));
-    KernelTime(tai.wrapping_add(at.0).wrapping_sub(now.0))
+    on(ClockId::Tai, at)
 }
 
 /// An instant of the monotonic clock on the real-time clock, for instants around now.
 #[must_use]
 pub fn realtime_of(at: MonotonicTime) -> KernelTime {
-    let (now, realtime) = (monotonic_now(), realtime_now());
-    KernelTime(realtime.0.wrapping_add(at.0).wrapping_sub(now.0))
+    on(ClockId::Realtime, at)
+}
+
+fn on(clock: ClockId, at: MonotonicTime) -> KernelTime {
+    let (now, there) = (monotonic_now(), read(clock));
+    KernelTime(there.wrapping_add(at.0).wrapping_sub(now.0))
 }
 
 /// Sleeps until the monotonic clock reads `deadline`; a deadline in the past returns at once.

@@ -10,6 +10,7 @@
 //! the other takes it for motion. The offset is sent until the device has confirmed an update that carried it, and again after
 //! each step.
 
+use crate::reported::Reported;
 use crate::time_offset::{OffsetCompensation, Offsets};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::{TimeBase, TimeSample};
@@ -24,17 +25,15 @@ pub(super) struct Clock {
     base: Option<TimeBase>,
     /// When the clocks were read last.
     read_at: Option<MonotonicTime>,
-    /// The offset that is being told, with the first update ID that carried it.
-    told: Option<(i64, u8)>,
-    /// Whether the device has confirmed an update that carried it.
-    confirmed: bool,
+    /// The offset on its way to the device.
+    reported: Reported<i64>,
     /// Device Time Offset as received last.
     device: i64,
     compensation: OffsetCompensation,
 }
 
 impl Clock {
-    /// The connection is a new one: nothing is known of the device's clock, nor has it been told anything.
+    /// The connection is a new one: nothing is known of the device's clock, nor does it know of ours.
     pub fn reconnect(&mut self) {
         *self = Self { base: self.base, read_at: self.read_at, ..Self::default() };
     }
@@ -69,21 +68,12 @@ impl Clock {
 
     /// Controller Time Offset if it is to be put into update `update_id`.
     pub fn due(&mut self, update_id: u8) -> Option<i64> {
-        let offset = self.offset();
-        if self.told.is_none_or(|(told, _)| told != offset) {
-            self.told = Some((offset, update_id));
-            self.confirmed = false;
-        }
-        (!self.confirmed).then_some(offset)
+        self.reported.due(self.offset(), update_id)
     }
 
     /// The device has processed our update `update_id`.
     pub fn handle_received(&mut self, update_id: u8) {
-        if let Some((_, first)) = self.told
-            && update_id.wrapping_sub(first) <= u8::MAX / 2
-        {
-            self.confirmed = true;
-        }
+        self.reported.acknowledge(update_id);
     }
 
     fn offsets(&self) -> Offsets {
@@ -127,7 +117,7 @@ mod tests {
             clock.due(id)
         };
         assert_eq!(measure(&mut clock, 0, HOUR, 254), Some(HOUR));
-        assert_eq!(measure(&mut clock, 1, HOUR + 900, 255), Some(HOUR), "what was told stays");
+        assert_eq!(measure(&mut clock, 1, HOUR + 900, 255), Some(HOUR), "what was reported stays");
         clock.handle_received(253);
         assert_eq!(measure(&mut clock, 2, HOUR, 0), Some(HOUR), "the device had not seen it yet");
         clock.handle_received(254);
@@ -150,16 +140,16 @@ mod tests {
         for step in [150_000, -150_000, 900_000, 1_100_000, 10_000_000, -10_000_000, HOUR] {
             let mut clock = Clock::default();
             let mut local = None;
-            let mut told = 0;
+            let mut reported = 0;
             for period in 0..50_i64 {
                 clock.feed(at(period), system(period, if period < 20 { 0 } else { step }));
-                told = clock.due(0).unwrap_or(told);
-                let now = clock.system_at(at(period)).0.wrapping_sub(told.cast_unsigned());
+                reported = clock.due(0).unwrap_or(reported);
+                let now = clock.system_at(at(period)).0.wrapping_sub(reported.cast_unsigned());
                 if let Some(before) = local.replace(now) {
                     assert_eq!(now - before, PERIOD.as_nanos().cast_unsigned(), "{step}: period {period}");
                 }
             }
-            assert_eq!(told, step);
+            assert_eq!(reported, step);
         }
     }
 

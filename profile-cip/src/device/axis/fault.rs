@@ -3,9 +3,9 @@
 use super::drive_link::{AbortCause, AbortOrder, DriveImage};
 use super::exception::{DriveCondition, ExceptionAction, ExceptionActions, worst_action};
 use super::fault_log::{FaultLog, LogEntry, LogKind};
-use super::reported::RecordLog;
 use super::state::AxisState;
 use super::{RAMP_AND_DISABLE, STATE_CHANGE_SHUTDOWN, fault_code};
+use crate::reported::RecordLog;
 use crate::wire::motion::codes::{AlarmType, ClearingEvent, FaultType};
 use crate::wire::motion::{AlarmRecord, FaultRecord};
 use arrayvec::ArrayVec;

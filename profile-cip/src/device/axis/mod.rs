@@ -15,7 +15,6 @@ pub(super) mod handshake;
 mod reference;
 pub mod refused;
 pub(super) mod report;
-pub(super) mod reported;
 mod request;
 pub mod state;
 mod status;
@@ -33,9 +32,9 @@ use self::exception::DriveCondition;
 use self::fault_log::FaultLog;
 use self::handshake::AxisControlHandshake;
 use self::refused::RefusedRequest;
-use self::reported::Reported;
 use self::state::{AxisConditions, AxisEvent, AxisState, ControlKind};
 use self::test::AxisTest;
+use crate::reported::Reported;
 use crate::wire::motion::actual::SafetyStatus;
 use crate::wire::motion::codes::{
     AxisControl, AxisIoStatus, AxisStatus, ClearingEvent, ControlMode, EventType, FeedbackMode,
@@ -219,16 +218,11 @@ impl Machine {
 }
 
 /// Status values on their way to the controller.
+#[derive(Default)]
 struct ReportedStatus {
     axis_status: Reported<(AxisStatus, u32)>,
     io_status: Reported<(AxisIoStatus, u32)>,
     safety: Reported<SafetyStatus>,
-}
-
-impl Default for ReportedStatus {
-    fn default() -> Self {
-        Self { axis_status: Reported::new(), io_status: Reported::new(), safety: Reported::new() }
-    }
 }
 
 impl ReportedStatus {

@@ -1,24 +1,18 @@
 //! System time of the device and the controller's time stamps in it.
 
-use crate::device::axis::reported::Reported;
 use crate::device::motion_link::SyncState;
+use crate::reported::Reported;
 use crate::time_offset::{OffsetCompensation, Offsets};
 use crate::wire::motion::codes::SyncStatus;
 use crate::wire::motion::id_list::parse_group_sync;
 use crate::wire::status::GeneralStatus;
 
 /// The clocks of device and controller.
+#[derive(Default)]
 pub(super) struct Clock {
     sync: SyncState,
     compensation: OffsetCompensation,
     reported_offset: Reported<i64>,
-}
-
-impl Default for Clock {
-    fn default() -> Self {
-        let (sync, compensation) = (SyncState::default(), OffsetCompensation::default());
-        Self { sync, compensation, reported_offset: Reported::new() }
-    }
 }
 
 impl Clock {

@@ -1,7 +1,7 @@
 //! What the motion device has counted: since its construction, and for the controller since the connection was opened.
 
 use super::io_counters::MotionCounters;
-use crate::device::axis::reported::Reported;
+use crate::reported::Reported;
 use crate::wire::Error;
 use crate::wire::motion::UpdateDiagnostics;
 

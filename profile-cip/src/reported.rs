@@ -1,6 +1,7 @@
-//! Status values and log records on their way to the controller, clause 6-2.7.1.2.2 (Status Data Set).
+//! Values and log records on their way to the other side: status of the device (clause 6-2.7.1.2.2, Status Data Set), time offsets
+//! of both.
 //!
-//! A value is sent when it has changed, in every update until the controller's Last Received ID names an update that
+//! A value is sent when it has changed, in every update until the other side's Last Received ID names an update that
 //! carried it. Records of a log go one after the other, the next one only when the one before it has arrived.
 
 use arrayvec::ArrayVec;
@@ -44,6 +45,12 @@ pub(crate) struct Reported<T> {
     in_flight: Option<(Flight, T)>,
 }
 
+impl<T: Copy + PartialEq> Default for Reported<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<T: Copy + PartialEq> Reported<T> {
     pub const fn new() -> Self {
         Self { arrived: None, in_flight: None }
@@ -65,7 +72,7 @@ impl<T: Copy + PartialEq> Reported<T> {
         Some(value)
     }
 
-    /// The controller has processed update `received`.
+    /// The other side has processed update `received`.
     pub fn acknowledge(&mut self, received: u8) {
         if let Some((flight, value)) = self.in_flight
             && flight.holds(received)
