@@ -131,7 +131,8 @@ fn text(overview: &Overview, colours: bool) -> String {
     }
     let lock = match cycles.phase_lock.as_str() {
         "free" => "by the gateway's own clock".to_owned(),
-        state => format!("{state} to system time ({} ns)", cycles.phase_error_ns),
+        "pulling" => format!("pulled to system time, {} ns off", cycles.phase_error_ns),
+        _ => format!("locked to system time, {} ns off", cycles.phase_error_ns),
     };
     let _ = writeln!(
         out,
@@ -284,6 +285,9 @@ mod tests {
 
     #[test]
     fn colours_mark_what_is_well_and_what_is_not() {
+        let pulled = Cycles { phase_lock: "pulling".to_owned(), phase_error_ns: 76_445, ..overview().cycles };
+        let shown = text(&Overview { cycles: pulled, ..overview() }, false);
+        assert!(shown.contains("62.5 us, pulled to system time, 76445 ns off;"), "{shown}");
         let text = text(&overview(), true);
         assert!(text.contains("\x1b[32mrunning\x1b[0m") && text.contains("\x1b[32msynchronized\x1b[0m"));
         assert!(text.contains("\x1b[31mfault over_current, the drive says 0x2310\x1b[0m"), "{text}");
