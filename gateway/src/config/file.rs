@@ -72,6 +72,8 @@ pub struct TimeTable {
     pub asymmetry: Option<Spanned<String>>,
     /// The way to the master is the longer one. Default: false.
     pub asymmetry_is_upstream: Option<bool>,
+    /// PTP is followed with the time stamps of the network card where it has some. Default: true.
+    pub card_stamps: Option<bool>,
     /// Management socket of `ptp4l`. Default: `"/var/run/ptp4l"`.
     #[schemars(transform = form::path)]
     pub socket: Option<Spanned<String>>,

@@ -236,6 +236,8 @@ pub struct Time {
     pub threshold: DurationNs,
     /// By how much the way from the master is longer than the mean of both ways.
     pub asymmetry: DurationNs,
+    /// The follower takes the time stamps of the network card where it has some.
+    pub card_stamps: bool,
     /// Management socket of `ptp4l`.
     pub socket: PathBuf,
     /// Clock of the network card that `ptp4l` keeps; `None` for that of the interface, or the host's clock.
@@ -250,6 +252,7 @@ impl Default for Time {
             domain: 0,
             threshold: DurationNs::from_micros(10),
             asymmetry: DurationNs::ZERO,
+            card_stamps: true,
             socket: PathBuf::from("/var/run/ptp4l"),
             phc: None,
         }

@@ -198,7 +198,7 @@ fn stamps(name: &str, granted: bool, features: &Features) -> Check {
     let hardware = features.time_stamps.is_some_and(|stamps| stamps.hardware);
     match (granted, hardware) {
         (true, true) => {
-            Check::good(AREA, what, "by the kernel; the card could do it too, but is not used for it")
+            Check::good(AREA, what, "by the kernel; those of the card are for PTP alone")
         }
         (true, false) => Check::good(AREA, what, "by the kernel"),
         (false, _) => Check::doubtful(
@@ -386,7 +386,7 @@ mod tests {
             ..Features::default()
         };
         assert_eq!(stamps("eth1", true, &Features::default()).found, "by the kernel");
-        assert!(stamps("eth1", true, &card).found.starts_with("by the kernel; the card could"));
+        assert!(stamps("eth1", true, &card).found.starts_with("by the kernel; those of the card"));
         assert_eq!(stamps("eth1", false, &card).verdict, Verdict::Doubtful);
     }
 

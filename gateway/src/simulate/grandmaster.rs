@@ -57,7 +57,7 @@ impl Grandmaster {
         config: MasterConfig,
         clock: ControllerClock,
     ) -> Result<Self, GrandmasterError> {
-        let sockets = PtpSockets::open(interface, Dscp::default())
+        let sockets = PtpSockets::open(interface, Dscp::default(), false)
             .map_err(|source| GrandmasterError::Open { interface: interface.to_owned(), source })?;
         let control = Arc::new(Control::default());
         control.domain.store(config.domain, Ordering::Relaxed);

@@ -10,6 +10,7 @@ pub mod can_error;
 pub mod can_interface;
 mod can_netlink;
 pub mod can_socket;
+pub mod card_stamps;
 pub mod clock;
 pub mod ethtool;
 pub mod gate;

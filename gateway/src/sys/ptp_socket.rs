@@ -1,7 +1,8 @@
 //! The sockets of a PTP clock: UDP 319 for event messages, with the kernel's stamps of receipt and sending, and UDP 320 for general
 //! ones.
 //!
-//! The stamps are those of the kernel, taken in the driver or just above it. `CLOCK_REALTIME` is only between them and the monotonic
+//! The stamps are those of the network card where it has some ([`CardStamps`]), else those of the kernel, taken in the driver or just
+//! above it. For the latter `CLOCK_REALTIME` is only between them and the monotonic
 //! clock of the same moment: a step of it spoils the messages of that moment, and those are left out.
 
 use std::io;
@@ -14,10 +15,13 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use socket2::{Domain, InterfaceIndexOrAddress, Protocol, SockAddr, Socket, Type};
 use thiserror::Error;
 
+use super::card_stamps::{CardStamps, NotUsed};
 use super::clock::{exactly_monotonic, monotonic_now};
 use super::link;
 use super::option::set_option;
-use super::receive::{enable_sent_time_stamps, enable_time_stamps, receive, receive_sent, wait_for_input};
+use super::receive::{
+    Message, enable_sent_time_stamps, enable_time_stamps, receive, receive_sent, wait_for_input,
+};
 
 /// Ports of event and general messages.
 const EVENT: u16 = 319;
@@ -94,14 +98,16 @@ pub struct Arrived {
 pub struct PtpSockets {
     event: Socket,
     general: Socket,
+    /// Those of the card, or why the kernel's are taken.
+    card: Result<CardStamps, NotUsed>,
 }
 
 impl PtpSockets {
-    /// Opens them on an interface; messages are marked with the code points of event and general messages, 0 to 63.
+    /// Opens them on an interface. `use_card`: stamps of the network card are taken where it has some.
     ///
     /// # Errors
     /// [`OpenError`].
-    pub fn open(interface: &str, dscp: Dscp) -> Result<Self, OpenError> {
+    pub fn open(interface: &str, dscp: Dscp, use_card: bool) -> Result<Self, OpenError> {
         let index = link::index(interface)
             .map_err(|_| OpenError::NoSuchInterface { interface: interface.to_owned() })?;
         let index = u32::try_from(index).unwrap_or(0);
@@ -110,8 +116,20 @@ impl PtpSockets {
         if !enable_time_stamps(event.as_fd()) {
             return Err(system("SO_TIMESTAMPNS")(io::Error::last_os_error()));
         }
-        enable_sent_time_stamps(event.as_fd()).map_err(system("SO_TIMESTAMPING"))?;
-        Ok(Self { event, general: open(GENERAL, index, dscp.general)? })
+        let card =
+            if use_card { CardStamps::start(interface, event.as_fd()) } else { Err(NotUsed::Unwanted) };
+        if card.is_err() {
+            enable_sent_time_stamps(event.as_fd()).map_err(system("SO_TIMESTAMPING"))?;
+        }
+        Ok(Self { event, general: open(GENERAL, index, dscp.general)?, card })
+    }
+
+    /// The card that stamps, or why the kernel does.
+    ///
+    /// # Errors
+    /// The reason is no failure.
+    pub fn card(&self) -> Result<&CardStamps, &NotUsed> {
+        self.card.as_ref()
     }
 
     /// Waits for a message until an instant at most.
@@ -158,7 +176,11 @@ impl PtpSockets {
     fn take(&self, buffer: &mut [u8]) -> io::Result<Option<Arrived>> {
         while let Some(message) = receive(self.event.as_fd(), buffer)? {
             // Without the time of its receipt an event message says nothing.
-            let at = message.at.and_then(exactly_monotonic);
+            let at = match &self.card {
+                Ok(card) if is_event(buffer.get(..message.len).unwrap_or(&[])) => card.received(message.card).map_err(io::Error::other)?,
+                Ok(_) => None,
+                Err(_) => message.at.and_then(exactly_monotonic),
+            };
             if let (Some(at), false) = (at, message.truncated) {
                 return Ok(Some(Arrived { len: message.len, event: Some(at) }));
             }
@@ -176,16 +198,27 @@ impl PtpSockets {
     fn sent(&self) -> io::Result<Option<MonotonicTime>> {
         let end = monotonic_now().0 + u64::try_from(SENT_TIME_OUT.as_nanos()).unwrap_or(0);
         loop {
-            if let Some(message) = receive_sent(self.event.as_fd())? {
-                return Ok(message.at.and_then(exactly_monotonic));
-            }
             let left = end.saturating_sub(monotonic_now().0);
-            if left == 0 {
-                return Ok(None);
+            match receive_sent(self.event.as_fd())? {
+                Some(message) => return self.left_at(Some(&message)),
+                None if left == 0 => return self.left_at(None),
+                None => wait_for_sent(self.event.as_fd(), left)?,
             }
-            wait_for_sent(self.event.as_fd(), left)?;
         }
     }
+
+    /// When a message left, by what the kernel says of it.
+    fn left_at(&self, message: Option<&Message>) -> io::Result<Option<MonotonicTime>> {
+        match &self.card {
+            Ok(card) => card.sent(message.and_then(|message| message.card)).map_err(io::Error::other),
+            Err(_) => Ok(message.and_then(|message| message.at).and_then(exactly_monotonic)),
+        }
+    }
+}
+
+/// Whether this is an event message of PTP version 2, as the filter of a card knows it.
+fn is_event(message: &[u8]) -> bool {
+    matches!(message, [kind, version, ..] if kind & 0x0F < 4 && version & 0x0F == 2)
 }
 
 /// Waits until something can be read from the error queue.

@@ -27,6 +27,8 @@ pub(super) struct Message {
     pub truncated: bool,
     /// When the kernel took the message from the network.
     pub at: Option<KernelTime>,
+    /// When the network card stamped it, ns of the card's own clock.
+    pub card: Option<u64>,
     /// Type of service octet of an IPv4 datagram: code point and congestion bits.
     pub tos: Option<u8>,
     /// Messages that this socket has lost so far because they were not fetched in time, where that was asked for.
@@ -35,8 +37,8 @@ pub(super) struct Message {
     pub own: bool,
 }
 
-/// Space for the control messages of a received message: one `SCM_TIMESTAMPNS` and one `IP_TOS` or `SO_RXQ_OVFL`.
-const RECEIVED_LEN: usize = 64;
+/// Space for the control messages of a received message: `SCM_TIMESTAMPNS`, `SCM_TIMESTAMPING`, and one `IP_TOS` or `SO_RXQ_OVFL`.
+const RECEIVED_LEN: usize = 128;
 
 /// Space for those of a sent one: `SCM_TIMESTAMPNS`, `SCM_TIMESTAMPING`, `IP_TOS` and `IP_RECVERR`.
 const SENT_LEN: usize = 192;
@@ -82,12 +84,16 @@ fn receive_from<const LEN: usize>(
         };
     };
 
-    let (mut at, mut tos, mut dropped) = (None, None, None);
+    let (mut at, mut card, mut tos, mut dropped) = (None, None, None, None);
     for (level, kind, data) in ControlMessages(control.0.get(..message.msg_controllen as _).unwrap_or(&[])) {
         match (level, kind) {
             (libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS) => at = time_stamp(data),
-            // The first of three is that of the kernel; a message that has passed no driver that stamps has none.
-            (libc::SOL_SOCKET, libc::SCM_TIMESTAMPING) => at = at.or(time_stamp(data).filter(|at| at.0 > 0)),
+            // Three, each zero where there is none: of the kernel, one that is not used any more, and of the card.
+            (libc::SOL_SOCKET, libc::SCM_TIMESTAMPING) => {
+                let stamp = |place| time_stamp(data.get(place * TIME_STAMP_LEN..)?).filter(|at| at.0 > 0);
+                at = at.or(stamp(0));
+                card = stamp(2).map(|at| at.0);
+            }
             (libc::IPPROTO_IP, libc::IP_TOS) => tos = data.first().copied(),
             (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => {
                 dropped = data.first_chunk().map(|bytes| u32::from_ne_bytes(*bytes));
@@ -97,7 +103,7 @@ fn receive_from<const LEN: usize>(
     }
     let flag = |flag: libc::c_int| message.msg_flags & flag != 0;
     let (truncated, own) = (flag(libc::MSG_TRUNC), flag(libc::MSG_CONFIRM));
-    Ok(Some(Message { from, len, truncated, at, tos, dropped, own }))
+    Ok(Some(Message { from, len, truncated, at, card, tos, dropped, own }))
 }
 
 /// The control messages of one `recvmsg`: level, type and data of each. A `cmsghdr` is length (with itself), level and type; each
@@ -117,6 +123,9 @@ impl<'a> Iterator for ControlMessages<'a> {
         Some((libc::c_int::from_ne_bytes(*level), libc::c_int::from_ne_bytes(*kind), data))
     }
 }
+
+/// Bytes of a `timespec`.
+const TIME_STAMP_LEN: usize = size_of::<libc::timespec>();
 
 /// A `timespec`.
 fn time_stamp(data: &[u8]) -> Option<KernelTime> {

@@ -29,6 +29,7 @@ use super::status::{Identity, TimeStatus};
 use crate::config::{Time, TimeSource};
 use crate::latest::{Publisher, latest};
 use crate::simulate::setup::HOST_CLOCK;
+use crate::sys::card_stamps::{NotUsed, StampsMissing};
 use crate::sys::clock::{self, KernelClock, monotonic_now};
 use crate::sys::ethtool;
 use crate::sys::phc::Phc;
@@ -153,9 +154,11 @@ impl TimeService {
                 let interface = interface.ok_or(SourceError::NoInterface)?;
                 // A follower sends no general message.
                 let dscp = Dscp { event: place.event_dscp, ..Dscp::default() };
-                let sockets = PtpSockets::open(&interface, dscp)?;
+                let use_card = config.card_stamps;
+                let sockets = PtpSockets::open(&interface, dscp, use_card)?;
+                let port = FollowerPort { interface, dscp, use_card };
                 let control = Arc::clone(&control);
-                Some(spawn(move || run_follower(follower, &interface, dscp, sockets, &control, reporter))?)
+                Some(spawn(move || run_follower(follower, port, sockets, &control, reporter))?)
             }
             TimeSource::Daemon => {
                 let interface = config.interface.as_ref().or(place.interface.as_ref());
@@ -241,11 +244,43 @@ impl Reporter {
     }
 }
 
+/// How the sockets of the follower are opened.
+struct FollowerPort {
+    interface: String,
+    dscp: Dscp,
+    /// Stamps of the network card are taken where it has some.
+    use_card: bool,
+}
+
+impl FollowerPort {
+    fn open(&self) -> Result<PtpSockets, OpenError> {
+        PtpSockets::open(&self.interface, self.dscp, self.use_card)
+    }
+
+    /// Says who stamps.
+    fn tell(&self, sockets: &PtpSockets) {
+        let interface = &self.interface;
+        match sockets.card() {
+            Ok(card) => {
+                info!(interface, clock = %card.path().display(), "system time: the network card stamps PTP");
+            }
+            Err(NotUsed::None | NotUsed::Unwanted) => info!(interface, "system time: the kernel stamps PTP"),
+            Err(reason) => {
+                warn!(interface, %reason, "system time: the kernel stamps PTP, although the network card could");
+            }
+        }
+    }
+
+    /// Takes the stamps of the kernel from now on if the card gives none, as its driver may promise more than it does.
+    fn learn(&mut self, failure: &std::io::Error) {
+        self.use_card &= !failure.get_ref().is_some_and(|reason| reason.is::<StampsMissing>());
+    }
+}
+
 /// Follows until it is stopped; a follower that fails begins anew, and time is not synchronized meanwhile.
 fn run_follower(
     config: FollowerConfig,
-    interface: &str,
-    dscp: Dscp,
+    mut port: FollowerPort,
     first: PtpSockets,
     control: &Arc<Control>,
     mut reporter: Reporter,
@@ -253,9 +288,10 @@ fn run_follower(
     let mut sockets = Some(first);
     while !control.stop.load(Ordering::Relaxed) {
         let config = FollowerConfig { domain: control.domain.load(Ordering::Relaxed), ..config };
-        let opened = sockets.take().map_or_else(|| PtpSockets::open(interface, dscp), Ok);
+        let opened = sockets.take().map_or_else(|| port.open(), Ok);
         let failure = match opened {
             Ok(sockets) => {
+                port.tell(&sockets);
                 let mut wire = HostWire { sockets, domain: config.domain, control: Arc::clone(control) };
                 let followed = catch_unwind(AssertUnwindSafe(|| {
                     follow(&config, &mut wire, &mut |status| reporter.report(status))
@@ -263,13 +299,16 @@ fn run_follower(
                 match followed {
                     // The end, or another domain.
                     Ok(Ok(())) => continue,
-                    Ok(Err(failure)) => failure.to_string(),
+                    Ok(Err(failure)) => {
+                        port.learn(&failure);
+                        failure.to_string()
+                    }
                     Err(_) => "an error in the PTP library".to_owned(),
                 }
             }
             Err(failure) => failure.to_string(),
         };
-        error!(interface, %failure, "the PTP follower has ended; it begins anew in {} s", PAUSE.as_secs());
+        error!(interface = port.interface, %failure, "the PTP follower has ended; it begins anew in {} s", PAUSE.as_secs());
         reporter.report(&TimeStatus::ptp(&config));
         let end = monotonic_now().0 + u64::try_from(PAUSE.as_nanos()).unwrap_or(0);
         while monotonic_now().0 < end && !control.stop.load(Ordering::Relaxed) {
@@ -348,6 +387,17 @@ mod tests {
         }
         let ptp = TimeService::start(&Time { source: TimeSource::Ptp, ..Time::default() }, &place);
         assert!(matches!(ptp, Err(SourceError::NoInterface)));
+    }
+
+    #[test]
+    fn the_kernel_stamps_when_the_card_does_not_do_what_it_promised() {
+        let mut port = FollowerPort { interface: "eth0".to_owned(), dscp: Dscp::default(), use_card: true };
+        port.learn(&std::io::Error::other("the network is down"));
+        assert!(port.use_card);
+        port.learn(&std::io::Error::other(StampsMissing { direction: "were sent" }));
+        assert!(!port.use_card);
+        port.learn(&std::io::Error::other("the network is down"));
+        assert!(!port.use_card, "it stays so");
     }
 
     #[test]

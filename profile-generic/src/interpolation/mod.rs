@@ -63,14 +63,14 @@ impl TargetUpdate {
 /// The longest update period. CIP Motion uses some milliseconds; a tenth of a second is beyond any of them.
 pub const MAX_PERIOD: DurationNs = DurationNs::from_millis(100);
 
-/// The most periods that may be extrapolated after a loss.
-pub const MAX_EXTRAPOLATION: u32 = 4;
+/// The most periods that may be extrapolated after a loss: as far as the Controller Update Delay High Limit can be set.
+pub const MAX_EXTRAPOLATION: u32 = 10;
 
 /// The most periods between the targets of two updates that are taken as a gap and not as a wrong time stamp.
 pub const MAX_GAP: i64 = 16;
 
 /// Segments that may wait for their time. A controller whose clock is ahead is served up to the update delay high limit, at most
-/// ten periods; its updates are for two periods later, and one segment is in use.
+/// [`MAX_EXTRAPOLATION`] periods; its updates are for two periods later, and one segment is in use.
 const MAX_SEGMENTS: usize = 16;
 
 /// How good a fine set-point is.
@@ -226,6 +226,11 @@ impl FineInterpolator {
     /// The configuration.
     pub const fn config(&self) -> &InterpolatorConfig {
         &self.config
+    }
+
+    /// Sets how many periods to go on when updates are overdue, from now on; more than [`MAX_EXTRAPOLATION`] are that many.
+    pub fn set_extrapolation(&mut self, periods: u32) {
+        self.config.extrapolate_periods = periods.min(MAX_EXTRAPOLATION);
     }
 
     /// Forgets everything and holds `position` until the first update: when the axis is enabled, and after a

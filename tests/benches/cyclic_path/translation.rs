@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use axisbridge::engine::axis::{AxisChannel, Limits};
+use axisbridge::engine::axis::{AxisChannel, Limits, Updates};
 use axisbridge::engine::cyclic::{Cycle, Received};
 use axisbridge::engine::device::CipAxis;
 use axisbridge::mapping::{CipProgram, CipTrackers, DriveProgram, Mapping};
@@ -87,7 +87,7 @@ impl Axis {
         let mut channel = AxisChannel::new(Limits::default(), Reaction::DecelerateAndDisable, true);
         channel.set_count(north.count());
         channel.set_south(south.clone());
-        channel.keep_update_period(period, TargetUpdate::Interpolate);
+        channel.keep_updates(Updates { period, may_miss: 4, first: TargetUpdate::Interpolate });
         let order = AxisCommandImage {
             state: AxisState::Running,
             action: DriveAction::Enable,

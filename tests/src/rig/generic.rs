@@ -3,7 +3,7 @@
 //! What leads it is [`GenericRig::command`], as a north side of another profile would; see `AxisChannel::from_north`.
 
 use axisbridge::config::Config;
-use axisbridge::engine::axis::{AxisChannel, Limits, Reactions};
+use axisbridge::engine::axis::{AxisChannel, Limits, Reactions, Updates};
 use axisbridge::engine::build::can::{Network, network};
 use axisbridge::engine::build::sercos::master_config;
 use axisbridge::engine::bus::can::CanBus;
@@ -318,7 +318,7 @@ impl<S: South> OneAxis<S> {
         };
         let system = rig.system();
         let axis = &mut rig.engine.axes_mut()[0];
-        axis.keep_update_period(UPDATE_PERIOD, TargetUpdate::Interpolate);
+        axis.keep_updates(Updates { period: UPDATE_PERIOD, may_miss: 4, first: TargetUpdate::Interpolate });
         // A homing that fails is no reason to stop an axis that stands: it may be led again.
         let mut reactions = Reactions::default();
         reactions.set(FaultCause::HOMING, Reaction::Alarm);

@@ -16,7 +16,7 @@
 use std::time::Instant;
 
 use axisbridge::config::Config;
-use axisbridge::engine::axis::{AxisChannel, Limits as AxisLimits};
+use axisbridge::engine::axis::{AxisChannel, Limits as AxisLimits, Updates};
 use axisbridge::engine::cyclic::{Cycle, Received};
 use axisbridge::engine::device::CipAxis;
 use axisbridge::mapping::{DriveProgram, Mapping};
@@ -171,7 +171,7 @@ impl Path {
         let mut channel = AxisChannel::new(AxisLimits::default(), Reaction::DecelerateAndDisable, true);
         channel.set_count(axis.north.count());
         channel.set_south(south.clone());
-        channel.keep_update_period(PERIOD, TargetUpdate::Interpolate);
+        channel.keep_updates(Updates { period: PERIOD, may_miss: 4, first: TargetUpdate::Interpolate });
         let order = AxisCommandImage {
             state: AxisState::Running,
             action: DriveAction::Enable,

@@ -195,7 +195,7 @@ fn lose(
     bus: Bus,
     (cycle, period): (i64, i64),
     model: TimingModel,
-    count: u32,
+    (high_limit, count): (u8, u32),
     direction: fn(&mut Rig, Box<dyn FnMut() -> bool>),
 ) -> (Rig, u64) {
     let (cycle, period) = (DurationNs::from_millis(cycle), DurationNs::from_millis(period));
@@ -205,8 +205,8 @@ fn lose(
     let mut config = Chain { bus, synchronous: true }.controller(&rig);
     config.rpi_us = u32::try_from(period.as_nanos() / 1_000).expect("some milliseconds");
     config.timing = model;
-    config.update_delay_high_limit = Some(4);
-    let limits = [(HIGH_LIMIT, 4), (LOW_LIMIT, 2)].map(|(id, value)| AttributeSet::usint(id, value));
+    config.update_delay_high_limit = Some(high_limit);
+    let limits = [(HIGH_LIMIT, high_limit), (LOW_LIMIT, 2)].map(|(id, value)| AttributeSet::usint(id, value));
     config.class_attributes.extend(limits);
     let step = Step::MoveAbsolute { axis: 1, position: 20.0, limits: LIMITS };
     rig.connect_with(config, vec![Step::Enable(AXIS), step]);
@@ -233,12 +233,14 @@ fn lose(
 fn as_many_missed_updates_as_the_high_limit_says_are_ridden_through() {
     let ratios = [(2, 2), (2, 4), (2, 8)];
     let models = [TimingModel::OneCycle, TimingModel::TwoCycle, TimingModel::ThreeCycle];
-    for (bus, periods, model) in
-        ratios.into_iter().flat_map(|ratio| models.map(|model| (Bus::Sercos, ratio, model)))
-    {
-        let name = format!("{bus} {periods:?} {model:?}");
-        for (count, fault) in [(4, false), (5, true)] {
-            let (rig, _) = lose(bus, periods, model, count, |rig, mut keep| {
+    let rows = ratios.into_iter().flat_map(|ratio| models.map(|model| (Bus::Sercos, ratio, model, 4)));
+    // As high as it can be set, and lower than the default.
+    let rows = rows.chain([10, 3].map(|limit| (Bus::Sercos, (2, 4), TimingModel::ThreeCycle, limit)));
+    for (bus, periods, model, limit) in rows {
+        let name = format!("{bus} {periods:?} {model:?}, limit {limit}");
+        let at_limit = u32::from(limit);
+        for (count, fault) in [(at_limit, false), (at_limit + 1, true)] {
+            let (rig, _) = lose(bus, periods, model, (limit, count), |rig, mut keep| {
                 rig.tamper_command = Some(Box::new(move |_| keep()));
             });
             // The controller closes the connection of a device at fault, and that ends the fault.
@@ -255,12 +257,12 @@ fn as_many_missed_updates_as_the_high_limit_says_are_ridden_through() {
             let lost = rig.engine.devices()[0].device().counters().lost_updates;
             assert!(lost == u64::from(count) || fault, "{name}: {lost} of {count} counted");
         }
-        for (count, goes_on) in [(4, true), (5, false)] {
-            let (rig, lost) = lose(bus, periods, model, count, |rig, mut keep| {
+        for (count, goes_on) in [(at_limit, true), (at_limit + 1, false)] {
+            let (rig, lost) = lose(bus, periods, model, (limit, count), |rig, mut keep| {
                 rig.tamper_actual = Some(Box::new(move |_| keep()));
             });
             let report = rig.report();
-            let missing = Failure::UpdatesMissing { missing: 5, limit: 4 };
+            let missing = Failure::UpdatesMissing { missing: at_limit + 1, limit };
             assert_eq!(report.failure, (!goes_on).then_some(missing), "{name}: {count} lost");
             if goes_on {
                 assert_eq!(lost, u64::from(count), "{name}");

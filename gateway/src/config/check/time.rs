@@ -67,6 +67,7 @@ pub(super) fn check(problems: &mut Problems, table: Option<&TimeTable>, listen: 
     }
     let path = |path: &Spanned<String>| PathBuf::from(path.get_ref());
     Some(Time {
+        card_stamps: table.card_stamps.unwrap_or(Time::default().card_stamps),
         socket: table.socket.as_ref().map_or(Time::default().socket, path),
         phc: table.phc.as_ref().map(path),
         source: source?,
@@ -106,10 +107,11 @@ mod tests {
             domain: 3,
             threshold: DurationNs::from_micros(50),
             asymmetry: DurationNs(250),
+            card_stamps: false,
             socket: "/run/ptp/own".into(),
             phc: Some("/dev/ptp3".into()),
         };
-        let text = "source = \"ptp\"\ninterface = \"eth1\"\ndomain = 3\nthreshold = \"50 us\"\nasymmetry = \"250 ns\"\n\
+        let text = "source = \"ptp\"\ninterface = \"eth1\"\ndomain = 3\nthreshold = \"50 us\"\nasymmetry = \"250 ns\"\ncard_stamps = false\n\
              socket = \"/run/ptp/own\"\nphc = \"/dev/ptp3\"";
         assert_eq!(time(text), Ok(expected.clone()));
         let upstream = format!("{text}\nasymmetry_is_upstream = true");

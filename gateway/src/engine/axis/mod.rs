@@ -57,7 +57,7 @@ pub use self::hookup::HookupSettings;
 pub use self::orders::{Intent, Owner, Wish};
 pub use self::position_jump::PositionJump;
 pub use self::reactions::Reactions;
-pub use self::set_points::{NorthPoints, Target};
+pub use self::set_points::{NorthPoints, Target, Updates};
 pub use self::start_stop::StopSettings;
 pub use self::waiting::{Awaited, Waiting};
 
@@ -106,11 +106,6 @@ pub const RESET_TIME_OUT: DurationNs = DurationNs::from_secs(5);
 
 /// Cycles for which a fault reset stands in the control word: its edge counts, and a telegram or two may be lost.
 const RESET_CYCLES: u8 = 5;
-
-/// Update periods that the interpolator goes on beyond its last target before it holds and the command counts as lost.
-/// The connection's own limit for missed updates, 4 by default (class attribute Controller Update Delay High Limit), is
-/// of the same order: whichever is reached first stops the axis.
-const EXTRAPOLATE_PERIODS: u32 = 4;
 
 /// What the box itself watches.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

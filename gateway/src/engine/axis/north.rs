@@ -5,7 +5,7 @@
 //! that the drive goes to by itself. Both paths end in the same state machine, interpolator and limits.
 
 use super::guard::Finding;
-use super::set_points::Before;
+use super::set_points::{Before, Updates};
 use super::{AxisChannel, Intent, Loss, NorthPoints, Owner, Reactions, StopSettings, Wish};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::hookup::TestOrder;
@@ -82,9 +82,9 @@ impl AxisChannel {
         }
     }
 
-    /// Sets the update period of the north side. `first` is the target update until set-points bring another one.
-    pub fn keep_update_period(&mut self, period: DurationNs, first: TargetUpdate) {
-        self.set_points.keep_period(period, first, &self.feedback);
+    /// Sets how the north side sends its set-points.
+    pub fn keep_updates(&mut self, updates: Updates) {
+        self.set_points.keep_updates(updates, &self.feedback);
     }
 
     /// Raises a fault: the controller's configuration of this axis cannot be used.
@@ -302,7 +302,7 @@ impl AxisChannel {
     /// Takes a command in generic units. Call it in every cycle after [`Self::from_drive`]. A command with the `sequence` of
     /// the one before has no effect.
     ///
-    /// Set-points need an update period ([`Self::keep_update_period`]) and go on without an update for a few periods only.
+    /// Set-points need an update period ([`Self::keep_updates`]) and go on without an update for a few periods only.
     /// A drive that goes to a target or homes does so until it gets another command: if the north side is lost, call
     /// [`Self::lose_north`].
     pub fn from_north(&mut self, now: MonotonicTime, system: SystemTime, command: &AxisCommand) {

@@ -3,7 +3,7 @@
 use profile_generic::fault::FaultCause;
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
 use profile_generic::interpolation::{
-    FineInterpolator, InterpolatorConfig, Motion, Quality, TargetUpdate, UpdateError,
+    FineInterpolator, InterpolatorConfig, MAX_EXTRAPOLATION, Motion, Quality, TargetUpdate, UpdateError,
 };
 use profile_generic::mode::ModeSelection;
 use profile_generic::quantity::{Position, Quantity, Velocity};
@@ -11,8 +11,19 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::guard::{Bounds, Finding, Guard, Lead, Trip};
 use super::trim::Trims;
-use super::{EXTRAPOLATE_PERIODS, Limits, Loss, MODE_TIME_OUT};
+use super::{Limits, Loss, MODE_TIME_OUT};
 use crate::engine::cyclic::Cycle;
+
+/// How a north side sends its set-points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Updates {
+    /// Time between two of them: above zero, at most [`MAX_PERIOD`](profile_generic::interpolation::MAX_PERIOD).
+    pub period: DurationNs,
+    /// How many may be missed before the command counts as lost; more than [`MAX_EXTRAPOLATION`] are that many.
+    pub may_miss: u32,
+    /// When they are meant, until they say it themselves.
+    pub first: TargetUpdate,
+}
 
 /// When set-points shall be reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,17 +145,20 @@ impl SetPoints {
         self.interpolator.as_ref().map(|known| known.config().period)
     }
 
-    /// Fine interpolation for a connection with this update period, in the way the last update asked for.
-    pub fn keep_period(&mut self, period: DurationNs, first: TargetUpdate, feedback: &AxisFeedback) {
-        let present = self.interpolator.as_ref().map(FineInterpolator::config);
-        if present.is_some_and(|config| config.period == period) {
+    /// Fine interpolation for updates like these, in the way the last one asked for.
+    pub fn keep_updates(&mut self, updates: Updates, feedback: &AxisFeedback) {
+        let Updates { period, may_miss, first } = updates;
+        let present = self.interpolator.as_mut();
+        if let Some(present) = present.filter(|present| present.config().period == period) {
+            present.set_extrapolation(may_miss);
             return;
         }
+        let present = self.interpolator.as_ref().map(FineInterpolator::config);
         let target_update = present.map_or(first, |config| config.target_update);
         self.interpolator = FineInterpolator::new(InterpolatorConfig {
             target_update,
             period,
-            extrapolate_periods: EXTRAPOLATE_PERIODS,
+            extrapolate_periods: may_miss.min(MAX_EXTRAPOLATION),
         });
         self.start(feedback);
     }
@@ -310,6 +324,7 @@ mod tests {
 
     const UNIT: i64 = 1_000_000_000;
     const PERIOD: DurationNs = DurationNs::from_millis(4);
+    const UPDATES: Updates = Updates { period: PERIOD, may_miss: 4, first: TargetUpdate::Interpolate };
 
     fn at(millis: i64) -> MonotonicTime {
         MonotonicTime(1_000_000_000) + DurationNs::from_millis(millis)
@@ -362,7 +377,7 @@ mod tests {
         let way = (TargetUpdate::Interpolate, None);
         assert_eq!(points.interpolate(at(0), &command(5), &before, &feedback(0), way), Err(Loss::NoPeriod));
         assert_eq!(points.commands, 1);
-        points.keep_period(PERIOD, TargetUpdate::Interpolate, &feedback(0));
+        points.keep_updates(UPDATES, &feedback(0));
         assert_eq!(points.period(), Some(PERIOD));
         assert_eq!(points.interpolate(at(0), &command(5), &before, &feedback(0), way), Ok(()));
     }
@@ -370,7 +385,7 @@ mod tests {
     #[test]
     fn a_cycle_gives_the_times_since_the_one_before_and_set_points_only_where_they_count() {
         let mut points = SetPoints::new();
-        points.keep_period(PERIOD, TargetUpdate::Interpolate, &feedback(0));
+        points.keep_updates(UPDATES, &feedback(0));
         points.begin_cycle(&cycle(0));
         assert_eq!(points.begin_cycle(&cycle(1)), (cycle(0).span, cycle(0).span));
         assert_eq!(points.begin_cycle(&cycle(4)), (DurationNs::from_millis(3), DurationNs::from_millis(3)));
@@ -384,7 +399,7 @@ mod tests {
     #[test]
     fn set_points_without_a_shared_clock_are_for_a_period_after_the_earliest_instant() {
         let mut points = SetPoints::new();
-        points.keep_period(PERIOD, TargetUpdate::Interpolate, &feedback(0));
+        points.keep_updates(UPDATES, &feedback(0));
         points.begin_cycle(&cycle(0));
         assert_eq!(points.target(Target::Paced(at(10))), (TargetUpdate::Interpolate, at(15)));
         let direct = TargetUpdate::ALL[1];
@@ -396,7 +411,7 @@ mod tests {
         let mut points = SetPoints::new();
         let limits = Limits { velocity: Some(Velocity(10 * UNIT)), ..Limits::default() };
         assert!(points.leaps(&command(UNIT), Position::ZERO, at(2), &limits).is_none(), "no period");
-        points.keep_period(PERIOD, TargetUpdate::Interpolate, &feedback(0));
+        points.keep_updates(UPDATES, &feedback(0));
         points.begin_cycle(&cycle(0));
         // 2 ms to the target and two periods of 4 ms: 0.1 units, with a tenth to spare.
         assert!(points.leaps(&command(UNIT * 11 / 100), Position::ZERO, at(2), &limits).is_none());

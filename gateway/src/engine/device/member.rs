@@ -15,7 +15,7 @@ use super::axis::CipAxis;
 use super::reactions;
 use super::scaling::{Scaling, signal_octets};
 use super::stopping::{Settings, StopDefaults, Stopping};
-use crate::engine::axis::{AxisChannel, Owner, Reactions};
+use crate::engine::axis::{AxisChannel, Owner, Reactions, Updates};
 use crate::engine::notice::Notice;
 use crate::mapping::{CipProgram, CipScaling, Mapping};
 
@@ -179,7 +179,8 @@ impl Member {
         if let Some(connection) = device.connection() {
             // The update may bring another target; the period stays for the life of the connection.
             let period = DurationNs::from_micros(i64::from(connection.rpi_us));
-            axis.keep_update_period(period, TargetUpdate::Interpolate);
+            let may_miss = device.update_delay_high_limit();
+            axis.keep_updates(Updates { period, may_miss, first: TargetUpdate::Interpolate });
         }
         if let Some(view) = device.position_view(place) {
             let (attributes, signals) = (self.scaling.attributes(), &*axis);

@@ -22,7 +22,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use super::order::{ClientId, Failure, Generator, Jog, Move, Order};
 use super::profile::MotionProfile;
-use super::{JOG_TIME, UPDATE_PERIOD};
+use super::{JOG_TIME, UPDATE_PERIOD, UPDATES};
 use crate::engine::axis::{
     AxisChannel, Intent, RESET_TIME_OUT, Reactions, START_TIME_OUT, STOP_TIME_OUT, Wish,
 };
@@ -120,7 +120,7 @@ impl LocalAxis {
         self.source = Source::None;
         axis.set_local_control(true);
         axis.end_set_points();
-        axis.keep_update_period(UPDATE_PERIOD, TargetUpdate::Interpolate);
+        axis.keep_updates(UPDATES);
         // A disable ends without torque, whatever Stopping Action a controller had set.
         let mut settings = *axis.stop_settings();
         settings.plan.hold = false;

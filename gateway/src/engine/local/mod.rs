@@ -20,11 +20,12 @@ pub use self::order::{Answer, ClientId, Failure, Generator, Jog, Move, Order, Re
 pub use self::profile::MotionProfile;
 
 use profile_generic::inhibit::Inhibits;
+use profile_generic::interpolation::TargetUpdate;
 use profile_generic::parameter::Parameter;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use self::axis::LocalAxis;
-use super::axis::AxisChannel;
+use super::axis::{AxisChannel, Updates};
 use super::bus::{self, Buses, Purpose};
 use super::north::{Exchange, North};
 use super::notice::Notice;
@@ -36,6 +37,9 @@ pub const JOG_TIME: DurationNs = DurationNs::from_millis(500);
 
 /// Time between two set-points of the profile generator.
 pub const UPDATE_PERIOD: DurationNs = DurationNs::from_millis(4);
+
+/// How they are handed to the axis.
+const UPDATES: Updates = Updates { period: UPDATE_PERIOD, may_miss: 4, first: TargetUpdate::Interpolate };
 
 /// Length of the queues of requests and of answers.
 const QUEUE_LEN: usize = 64;

@@ -1,13 +1,27 @@
 //! The attributes that the protocol engine itself works with: the rows are generated from the dictionary.
 
+use profile_generic::interpolation::MAX_EXTRAPOLATION;
+
 pub use crate::generated::attributes::{ENGINE, id};
 
 /// Revision of the Motion Device Axis Object that the device speaks (clause 5-2.2).
 pub const OBJECT_REVISION: u16 = 4;
 
-/// Defaults of this device for attributes of instance 0 where the standard has none, in update periods.
-pub(super) const DEFAULTS: [(u16, i64); 2] =
-    [(id::UPDATE_DELAY_HIGH_LIMIT, 4), (id::UPDATE_DELAY_LOW_LIMIT, 2)];
+/// Default and range of an attribute of instance 0 where the standard has none.
+pub(super) struct Rule {
+    pub id: u16,
+    pub default: i64,
+    pub range: (f64, f64),
+}
+
+/// Missed updates that are an alarm and a fault, in update periods: as many as the interpolator can go on for at most.
+pub(super) const RULES: [Rule; 2] = [
+    Rule { id: id::UPDATE_DELAY_HIGH_LIMIT, default: 4, range: DELAY_LIMITS },
+    Rule { id: id::UPDATE_DELAY_LOW_LIMIT, default: 2, range: DELAY_LIMITS },
+];
+
+#[expect(clippy::cast_lossless, reason = "`f64::from` is not const")]
+const DELAY_LIMITS: (f64, f64) = (0.0, MAX_EXTRAPOLATION as f64);
 
 /// Numbers of attributes, and the table of those that every device has.
 macro_rules! attributes {

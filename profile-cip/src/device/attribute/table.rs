@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::engine::{DEFAULTS, ENGINE};
+use super::engine::{ENGINE, RULES};
 use super::entry::{Entry, encode_default};
 use super::{AttributeDefinition, DataType, DefaultValue, ElementRule, Scope};
 
@@ -76,19 +76,22 @@ impl AttributeTable {
         let mut all: Vec<AttributeDefinition> =
             definitions.iter().filter(|d| d.scope == scope).cloned().collect();
         for (_, id, data_type, access, default, name) in ENGINE.iter().filter(|row| row.0 == scope) {
-            let own = DEFAULTS.iter().find(|(known, _)| scope == Scope::Class && known == id);
-            let default = own.map_or(*default, |(_, default)| *default);
+            let own = RULES.iter().find(|rule| scope == Scope::Class && rule.id == *id);
+            let default = own.map_or(*default, |rule| rule.default);
+            let range = own.map(|rule| rule.range);
             match all.iter_mut().find(|d| d.id == *id) {
                 Some(d) if d.data_type.size() == data_type.size() && d.elements.is_none() => {
                     // A definition that leaves the default open must not turn a limit into 0.
                     if d.default == DefaultValue::Integer(0) {
                         d.default = DefaultValue::Integer(default);
                     }
+                    d.range = d.range.or(range);
                 }
                 Some(_) => return Err(TableError::EngineType { scope, id: *id, expected: *data_type }),
                 None => {
                     let mut definition = AttributeDefinition::new(scope, *id, *data_type, *access, name);
                     definition.default = DefaultValue::Integer(default);
+                    definition.range = range;
                     definition.settable_in_running = true;
                     all.push(definition);
                 }

@@ -230,6 +230,12 @@ impl MotionDevice {
         Some((SystemTime(stamp), connection.period()))
     }
 
+    /// Updates of the controller that may be missed before it is a fault: the Controller Update Delay High Limit.
+    #[must_use]
+    pub fn update_delay_high_limit(&self) -> u32 {
+        u32::try_from(self.engine.instances.high_limit()).unwrap_or(u32::MAX)
+    }
+
     /// The attributes of a scope in the order of their IDs.
     pub fn attributes(&self, scope: Scope) -> impl Iterator<Item = &AttributeDefinition> {
         self.engine.instances.table(scope).iter()
@@ -259,7 +265,7 @@ impl MotionDevice {
     pub fn command(&self, axis: usize, now: MonotonicTime) -> Option<AxisCommandImage> {
         let slot = self.engine.instances.slots.get(axis)?;
         let period = self.engine.connection.as_ref().map_or(0, IoConnection::period);
-        let limit = u32::try_from(self.engine.instances.high_limit()).unwrap_or(u32::MAX);
+        let limit = self.update_delay_high_limit();
         Some(slot.axis.command(now, &self.engine.context(None), period, limit))
     }
 

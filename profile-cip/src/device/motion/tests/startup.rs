@@ -121,6 +121,14 @@ fn class_and_axes_may_be_configured_in_the_same_update() {
         assert_eq!(rig.response(instance), Some((1, 0, vec![1, 0, 0, 0, low, high, 0, 0])), "{instance}");
     }
     assert_eq!(rig.device.engine.instances.high_limit(), 9);
+    // The interpolator goes on for ten periods at most, so more would be a promise that nothing keeps.
+    for (transaction, value, status) in [(2, 10, 0), (3, 11, 9), (4, 255, 9), (5, 0, 0)] {
+        rig.services = vec![Some((transaction, set, list(21, &[value])))];
+        rig.cycle();
+        let answer = vec![1, 0, 0, 0, 21, 0, status, 0];
+        assert_eq!(rig.response(0), Some((transaction, 0, answer)), "{value}");
+    }
+    assert_eq!(rig.device.engine.instances.high_limit(), 0);
     assert_eq!(rig.device.attribute(0, 461), Ok(&1.5_f32.to_le_bytes()[..]));
     assert_eq!(rig.device.attribute(1, 610), Ok(&[2][..]));
     assert_ne!(rig.device.attribute(0, 610), Ok(&[2][..]), "of its own instance alone");
