@@ -1,13 +1,36 @@
 //! The attributes that the device serves for one axis.
 
+use std::fmt;
+
 use profile_cip::device::axis_object::PositionView;
 use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{Conversion, Width};
 
 use super::cip_scaling::CipScaling;
-use super::cip_tables::{CipTables, Served, ServedAttribute, limit_has_sign};
+use super::cip_tables::{CipTables, Missing, Served, ServedAttribute, limit_has_sign};
 use super::dictionary::{Access, CipType, PolarityEffect};
+
+/// How far apart two values may be that are the same, of the larger one.
+const SAME: f64 = 0.001;
+
+/// The value of an attribute that is a single number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Number {
+    /// A whole one.
+    Integer(i64),
+    /// A real one.
+    Real(f64),
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::Real(value) => write!(f, "{value}"),
+        }
+    }
+}
 
 /// Who answers for an attribute, with the conversions of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,8 +39,8 @@ pub enum Backing {
     Device,
     /// The connection writes it.
     Connection,
-    /// It is stored and given back, without effect on the drive.
-    Shadow,
+    /// It is stored and given back, without effect: what the standard lets a device keep.
+    Stored,
     /// It never changes.
     Constant(i64),
     /// A value of the process image.
@@ -35,8 +58,8 @@ pub enum Backing {
         to_generic: Conversion,
         /// From the generic unit.
         from_generic: Conversion,
-        /// Whether a drive without the parameter makes the attribute unsupported; it is a shadow otherwise.
-        reject: bool,
+        /// What it is of a drive without the parameter.
+        missing: Missing,
     },
 }
 
@@ -150,20 +173,20 @@ fn entry(
     let backing = match *served {
         Served::Device => Backing::Device,
         Served::Connection => Backing::Connection,
-        Served::Shadow => Backing::Shadow,
+        Served::Stored => Backing::Stored,
         Served::Constant(value) => Backing::Constant(value),
         Served::Signal { signal, unit } => {
             let to_generic = scaling.convert(unit, turns)?;
             Backing::Signal { signal, from_generic: Conversion::new(to_generic.inverse()?) }
         }
-        Served::Parameter { parameter, unit, reject, range } => {
+        Served::Parameter { parameter, unit, missing, range } => {
             let to_generic = scaling.convert(unit, turns)?;
             let (low, high) = range.unwrap_or((i64::MIN, i64::MAX));
             Backing::Parameter {
                 parameter,
                 to_generic: Conversion::new(to_generic).within(low, high),
                 from_generic: Conversion::new(to_generic.inverse()?),
-                reject,
+                missing,
             }
         }
     };
@@ -267,6 +290,30 @@ impl AttributeEntry {
         }
         *out = seen.to_le_bytes();
         Ok(width.bytes())
+    }
+
+    /// Whether two values of the attribute are the same: reals to a thousandth, as drives keep whole steps of their units.
+    #[must_use]
+    pub fn agree(&self, a: &[u8], b: &[u8]) -> bool {
+        match (self.number(a), self.number(b)) {
+            (Some(Number::Real(a)), Some(Number::Real(b))) => {
+                (a - b).abs() <= a.abs().max(b.abs()) * SAME
+            }
+            (a, b) => a == b,
+        }
+    }
+
+    /// The number that the bytes of the attribute are; `None` for an array, a string, and bytes that are too few.
+    #[must_use]
+    pub fn number(&self, bytes: &[u8]) -> Option<Number> {
+        let width = self.number_width().ok()?;
+        Some(match (width, bytes) {
+            (Width::F32, &[a, b, c, d]) => Number::Real(f64::from(f32::from_le_bytes([a, b, c, d]))),
+            (Width::F64, &[a, b, c, d, e, f, g, h]) => {
+                Number::Real(f64::from_le_bytes([a, b, c, d, e, f, g, h]))
+            }
+            _ => Number::Integer(width.integer(bytes)?),
+        })
     }
 
     fn number_width(&self) -> Result<Width, ValueError> {

@@ -34,7 +34,7 @@ pub(super) fn definitions(mapping: &Mapping, table: &AttributeTable) -> Vec<Attr
                 definition.default = DefaultValue::Integer(value);
                 attribute::Backing::Stored
             }
-            Backing::Device | Backing::Connection | Backing::Shadow => attribute::Backing::Stored,
+            Backing::Device | Backing::Connection | Backing::Stored => attribute::Backing::Stored,
         };
         Some(definition)
     });

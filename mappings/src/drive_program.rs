@@ -312,7 +312,6 @@ pub struct DriveProgram {
     pub(super) commands: ArrayVec<(Action, Item), { Action::ALL.len() }>,
     pub(super) captures: CaptureProgram,
     pub(super) parameters: Vec<ParameterEntry>,
-    pub(super) rejected: Vec<Parameter>,
     pub(super) position_step: Option<i64>,
     pub(super) acknowledges: bool,
     /// Set-point and target of the position stand in one place of the telegram.
@@ -356,7 +355,6 @@ impl DriveProgram {
             commands: ArrayVec::new(),
             captures: CaptureProgram::default(),
             parameters: Vec::new(),
-            rejected: Vec::new(),
             position_step: None,
             acknowledges,
             shares_target: false,
@@ -748,11 +746,6 @@ impl DriveProgram {
     pub fn parameter(&self, parameter: Parameter) -> Option<&ParameterEntry> {
         let at = self.parameters.binary_search_by_key(&parameter, |entry| entry.parameter).ok()?;
         self.parameters.get(at)
-    }
-
-    /// Whether access to a parameter that this drive lacks must be refused; it is a shadow otherwise.
-    pub fn rejects(&self, parameter: Parameter) -> bool {
-        self.rejected.contains(&parameter)
     }
 
     /// The longest way from one position command to the next: in a drive that works modulo a longer one would lead the

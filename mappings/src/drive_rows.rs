@@ -22,8 +22,8 @@ pub(crate) const CYCLIC_WAYS: [(&str, bool); 2] = [("to_drive", true), ("from_dr
 /// Whether a drive that lacks a cyclic value or a mode is refused.
 pub(crate) const REFUSED: [(&str, bool); 2] = [("refuse", true), ("omit", false)];
 
-/// Whether an attribute is rejected where the drive lacks its parameter.
-pub(crate) const REJECTED: [(&str, bool); 2] = [("shadow", false), ("reject", true)];
+/// What a parameter is that the drive lacks: a value that is kept in its place would have no effect.
+pub(crate) const REJECTED: [(&str, ()); 1] = [("reject", ())];
 
 /// Whether commissioning fails where the drive refuses a step.
 pub(crate) const FAILS: [(&str, bool); 2] = [("fail", true), ("continue", false)];
@@ -56,8 +56,6 @@ pub(crate) struct ParameterRule<At> {
     pub quantity: Quantity,
     pub to_drive: bool,
     pub from_drive: bool,
-    /// Whether a drive without it is reported to the controller, in place of keeping the value in the gateway.
-    pub reject: bool,
     pub factor: Ratio,
     pub at: At,
 }
@@ -66,7 +64,7 @@ impl<At> ParameterRule<At> {
     /// A rule that only converts a value, both ways; the number of the parameter does not matter for that.
     pub fn plain(quantity: Quantity, at: At) -> Self {
         let (parameter, factor) = (Parameter::default(), Ratio::ONE);
-        Self { parameter, quantity, to_drive: true, from_drive: true, reject: false, factor, at }
+        Self { parameter, quantity, to_drive: true, from_drive: true, factor, at }
     }
 }
 
@@ -165,19 +163,18 @@ pub(super) fn parameter_row(
     resolver: &mut Resolver<'_>,
     generic: &GenericDictionary,
     name: &Name,
-    (direction, missing, factor): (&Name, &Name, Option<&RatioRow>),
+    (direction, missing, factor): (&Name, Option<&Name>, Option<&RatioRow>),
 ) -> Option<ParameterRule<()>> {
     let parameter = parameter(resolver, generic, name);
     let ways = directions(resolver, direction);
-    let reject = resolver.word("missing", missing, &REJECTED);
+    missing.map_or(Some(()), |missing| resolver.word("missing", missing, &REJECTED))?;
     let factor = factor.map_or(Some(Ratio::ONE), |factor| resolver.ratio("factor", factor));
-    let (parameter, (to_drive, from_drive), reject, factor) = (parameter?, ways?, reject?, factor?);
+    let (parameter, (to_drive, from_drive), factor) = (parameter?, ways?, factor?);
     if parameter.parameter.is_of_vendor() {
         vendor_ways(resolver, parameter, direction, (to_drive, from_drive));
-        never_shadowed(resolver, reject, missing);
     }
     let (parameter, quantity) = (parameter.parameter, parameter.quantity);
-    Some(ParameterRule { parameter, quantity, to_drive, from_drive, reject, factor, at: () })
+    Some(ParameterRule { parameter, quantity, to_drive, from_drive, factor, at: () })
 }
 
 /// What is passed through to the drive is read from it, and written where it may be: nothing else knows the value.
@@ -199,14 +196,6 @@ fn vendor_ways(
     }
 }
 
-/// A value that only the drive knows is never kept in its place.
-pub(super) fn never_shadowed(resolver: &mut Resolver<'_>, reject: bool, missing: &Name) {
-    if !reject {
-        let message = "expected `reject`: a parameter of a vendor is the drive's alone, a value kept in the gateway has no effect";
-        resolver.error(code::CONTRADICTION, missing.span(), "missing", message);
-    }
-}
-
 /// The parameter of a commissioning step that writes it.
 pub(super) fn written_parameter<At>(
     resolver: &mut Resolver<'_>,
@@ -225,8 +214,8 @@ pub(super) fn written_parameter<At>(
 impl<At> ParameterRule<At> {
     /// The same rule at another place.
     pub fn at<Other>(self, at: Other) -> ParameterRule<Other> {
-        let Self { parameter, quantity, to_drive, from_drive, reject, factor, .. } = self;
-        ParameterRule { parameter, quantity, to_drive, from_drive, reject, factor, at }
+        let Self { parameter, quantity, to_drive, from_drive, factor, .. } = self;
+        ParameterRule { parameter, quantity, to_drive, from_drive, factor, at }
     }
 }
 
@@ -283,11 +272,7 @@ impl DriveProgram {
         entry: impl Fn(&ParameterRule<At>) -> Result<Option<ParameterEntry>, E>,
     ) -> Result<(), E> {
         for rule in rules {
-            match entry(rule)? {
-                Some(entry) => self.parameters.push(entry),
-                None if rule.reject => self.rejected.push(rule.parameter),
-                None => {}
-            }
+            self.parameters.extend(entry(rule)?);
         }
         self.parameters.sort_by_key(|entry| entry.parameter);
         Ok(())

@@ -98,7 +98,7 @@ use std::sync::Arc;
 use profile_cip::device::attribute::AttributeDefinition;
 use profile_generic::mode::ModeSelection;
 
-pub use attributes::{AttributeEntry, AttributeTable, Backing, ValueError};
+pub use attributes::{AttributeEntry, AttributeTable, Backing, Number, ValueError};
 pub use capture_program::{
     CAPTURES_MAX, CaptureMode, CaptureProgram, Counter, Input, Latch, Place, Sequence, Stored,
     WORDS_MAX as CAPTURE_WORDS_MAX,
@@ -110,8 +110,8 @@ pub use cia402::{
 pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
-    CipTables, CipUnit, DisplacementUnit, ExceptionRow, Finder, ScalingAttributes, SequenceAttributes,
-    Served, ServedAttribute, Times,
+    CipTables, CipUnit, DisplacementUnit, ExceptionRow, Finder, Missing, ScalingAttributes,
+    SequenceAttributes, Served, ServedAttribute, Times,
 };
 pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,

@@ -438,7 +438,7 @@ fn hand_on(
     let axis = &mut axes[answer.axis];
     match answer.purpose {
         Purpose::Attribute { .. } => {
-            norths.devices.iter_mut().any(|channel| channel.answer(&answer, axes));
+            norths.devices.iter_mut().any(|channel| channel.answer(&answer, axes, notice));
         }
         Purpose::LocalParameter(ticket) => {
             if let Some(local) = norths.local {

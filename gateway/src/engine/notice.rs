@@ -33,7 +33,9 @@ use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
 use super::device::scaling::ScalingRefusal;
 use super::phase_lock::{LockState, Phase as LockPhase};
-use crate::mapping::{Cia402Error, Difference, DriveIdentity, InterpolationPeriod, Object, SercosError};
+use crate::mapping::{
+    Cia402Error, Difference, DriveIdentity, InterpolationPeriod, Number, Object, SercosError,
+};
 use crate::status::AxisWait;
 
 /// How much a notice matters.
@@ -337,6 +339,17 @@ pub enum Notice {
         /// Why that was refused.
         why: Refused,
     },
+    /// The controller would set something that the drive has otherwise and lets nobody set.
+    NotEqual {
+        /// Number of the axis.
+        axis: u8,
+        /// The attribute.
+        attribute: u16,
+        /// What the controller wants.
+        wanted: Option<Number>,
+        /// What the drive has.
+        held: Option<Number>,
+    },
     /// The scaling attributes of the controller make no sense; the axis stays out of operation.
     Scaling {
         /// Number of the axis: its place in the configuration, from 0.
@@ -439,6 +452,7 @@ impl Notice {
             | Self::Fault { axis, .. }
             | Self::DriveSays { axis, .. }
             | Self::Logged { axis, .. }
+            | Self::NotEqual { axis, .. }
             | Self::Scaling { axis, .. } => Some(*axis),
         }
     }
@@ -556,6 +570,12 @@ impl fmt::Display for Notice {
             Self::Strangers { device, count, from, why } => {
                 let s = if *count == 1 { "" } else { "s" };
                 write!(f, "device {device}: refused {count} datagram{s}, the last one from {from}: {why}")
+            }
+            Self::NotEqual { attribute, wanted: Some(wanted), held: Some(held), .. } => {
+                write!(f, "attribute {attribute} cannot be set to {wanted}: the drive has {held}, and only it can change that")
+            }
+            Self::NotEqual { attribute, .. } => {
+                write!(f, "attribute {attribute} is not what the drive has, and only the drive can change that")
             }
             Self::Scaling { error, .. } => write!(f, "the controller's scaling cannot be used: {error}"),
         }

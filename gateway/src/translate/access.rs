@@ -36,7 +36,7 @@ impl Translator {
         let (what, place) = match entry.backing {
             Backing::Device => ("served by the device".to_owned(), None),
             Backing::Connection => ("written by the connection".to_owned(), None),
-            Backing::Shadow => ("stored and given back, without effect on the drive".to_owned(), None),
+            Backing::Stored => ("stored and given back, without effect".to_owned(), None),
             Backing::Constant(value) => (format!("always {value}"), None),
             Backing::Signal { signal, .. } if entry.access == Access::SetCyclic => {
                 (format!("shows {signal}, set by cyclic write data only"), None)

@@ -517,7 +517,7 @@ impl<'a> Builder<'a> {
 
     fn parameter(&mut self, row: &Cia402ParameterRow) {
         let generic = &self.dictionaries.generic;
-        let words = (&row.direction, &row.missing, row.factor.as_ref());
+        let words = (&row.direction, row.missing.as_ref(), row.factor.as_ref());
         let rule = parameter_row(&mut self.resolver, generic, &row.parameter, words);
         let value = self.value("object", &row.object);
         let inverted = self.like("inverted", row.inverted.as_ref(), value.as_ref());

@@ -11,7 +11,7 @@ use profile_generic::sequence::{StopMethod, StopPlan};
 use profile_generic::state::{DriveState, Request};
 
 use super::{
-    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, Finder, ScalingAttributes,
+    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, Finder, MISSING, Missing, ScalingAttributes,
     SequenceAttributes, Served, ServedAttribute, Times, has_direction,
 };
 use crate::cip_events::{EventRule, EventTrigger};
@@ -22,7 +22,6 @@ use crate::compile_cip::{
 };
 use crate::device_link::DRIVE_ACTIONS;
 use crate::dictionary::{Access, CipAttribute, Dictionaries, GenericParameter, quantity};
-use crate::drive_rows::{REJECTED, never_shadowed};
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::format::{
@@ -635,7 +634,7 @@ impl Builder<'_> {
                 let words = [
                     ("device", Served::Device),
                     ("connection", Served::Connection),
-                    ("shadow", Served::Shadow),
+                    ("stored", Served::Stored),
                     ("constant", Served::Constant(value)),
                 ];
                 self.resolver.word("served_by", name, &words)
@@ -715,25 +714,22 @@ impl Builder<'_> {
             self.resolver.error(code::WRONG_KIND, name.span(), "parameter", message);
             return None;
         }
-        let Some(missing) = &row.missing else {
-            self.resolver.error(
-                code::MISSING_KEY,
-                name.span(),
-                "missing",
-                "expected `shadow` or `reject`, got nothing",
-            );
-            return None;
+        let missing = match &row.missing {
+            Some(word) => self.resolver.word("missing", word, &MISSING)?,
+            None => Missing::Absent,
         };
-        let reject = self.resolver.word("missing", missing, &REJECTED)?;
         if parameter.parameter.is_of_vendor() {
-            never_shadowed(&mut self.resolver, reject, missing);
+            if let Some(word) = row.missing.as_ref().filter(|_| missing != Missing::Absent) {
+                let message = "expected `reject`: a parameter of a vendor is the drive's alone, a value kept in the gateway has no effect";
+                self.resolver.error(code::CONTRADICTION, word.span(), "missing", message);
+            }
             self.settable(attribute, parameter, name);
         }
         let Some(unit) = self.tables.unit(&attribute.unit, parameter.quantity) else {
             self.resolver.error(code::UNIT, name.span(), "parameter", no_unit(attribute, parameter.quantity));
             return None;
         };
-        Some(Served::Parameter { parameter: parameter.parameter, unit, reject, range: parameter.range })
+        Some(Served::Parameter { parameter: parameter.parameter, unit, missing, range: parameter.range })
     }
 
     /// The attribute of a vendor's parameter is set only where and when the drive takes a value.

@@ -140,8 +140,8 @@ pub enum Served {
     Device,
     /// The connection writes it.
     Connection,
-    /// It is stored and given back, without effect on the drive.
-    Shadow,
+    /// It is stored and given back, without effect: what the standard lets a device keep.
+    Stored,
     /// It never changes.
     Constant(i64),
     /// A value of the process image.
@@ -157,12 +157,27 @@ pub enum Served {
         parameter: Parameter,
         /// Unit of the attribute.
         unit: CipUnit,
-        /// Whether a drive without the parameter makes the attribute unsupported; it is a shadow otherwise.
-        reject: bool,
+        /// What it is of a drive without the parameter.
+        missing: Missing,
         /// Least and greatest value that may be set, in the generic unit.
         range: Option<(i64, i64)>,
     },
 }
+
+/// What an attribute is of a drive without its parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Missing {
+    /// Not supported.
+    Absent,
+    /// The device goes by its value itself.
+    Device,
+    /// Stored and given back, without effect.
+    Stored,
+}
+
+/// Words of `missing`; without one the attribute is not supported.
+pub(crate) const MISSING: [(&str, Missing); 3] =
+    [("reject", Missing::Absent), ("device", Missing::Device), ("stored", Missing::Stored)];
 
 /// An attribute that the device serves.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -243,7 +258,7 @@ impl ServedAttribute {
     /// Makes one of all that is only stored and given back.
     pub(super) fn forget_who_stores(&mut self) {
         if matches!(self.served, Served::Device | Served::Connection) {
-            self.served = Served::Shadow;
+            self.served = Served::Stored;
         }
     }
 }

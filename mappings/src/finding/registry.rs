@@ -394,7 +394,7 @@ registry! {
 
     OVERLAY_NO_EFFECT = 70 Warning "a row that changes nothing":
         "The row of the overlay says what the table already says. Either the table now has the change, or something else was meant.",
-        "[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmissing = \"shadow\"",
+        "[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\ndirection = \"both\"",
         "Remove the row.";
     OVERLAY_CYCLE = 71 Error "overlays that build on each other":
         "`base` names an overlay that itself builds on this one, so there is no order in which they could be applied.",

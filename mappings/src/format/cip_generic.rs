@@ -419,11 +419,12 @@ pub struct CipAttributeRow {
     pub parameter: Option<Name>,
     /// Signal behind it.
     pub signal: Option<Name>,
-    /// Who serves it otherwise: `device`, `connection`, `shadow` or `constant`.
+    /// Who serves it otherwise: `device`, `connection`, `constant` (it can only be set to what it is) or `stored` (without effect).
     pub served_by: Option<Name>,
     /// Value of a constant.
     pub value: Option<i64>,
-    /// What happens when the drive has no such parameter: `shadow` or `reject`.
+    /// What the attribute is of a drive without the parameter: `reject` (not supported, the default), `device` (the gateway goes by the
+    /// value itself) or `stored` (without effect).
     pub missing: Option<Name>,
     /// Least and greatest value that may be set; others are refused.
     pub range: Option<[i64; 2]>,

@@ -335,8 +335,8 @@ pub struct Cia402ParameterRow {
     pub common: Option<Name>,
     /// `both`, `to_drive` or `from_drive`.
     pub direction: Name,
-    /// What happens when the drive has no such object: `shadow` or `reject`.
-    pub missing: Name,
+    /// What happens when the drive has no such object: `reject`, which is the default.
+    pub missing: Option<Name>,
     /// Factor between parameter and object, for signs (`[-1, 1]`).
     pub factor: Option<RatioRow>,
     /// Where it comes from.

@@ -463,8 +463,8 @@ pub struct SercosParameterRow {
     pub idn: Name,
     /// `both`, `to_drive` or `from_drive`.
     pub direction: Name,
-    /// What happens when the drive has no such IDN: `shadow` or `reject`.
-    pub missing: Name,
+    /// What happens when the drive has no such IDN: `reject`, which is the default.
+    pub missing: Option<Name>,
     /// Factor between parameter and IDN, for signs (`[-1, 1]`) and reciprocals of units.
     pub factor: Option<RatioRow>,
     /// No source reports the unit: the drive's element 4 does, or the parameter is missing.

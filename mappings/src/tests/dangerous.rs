@@ -47,8 +47,8 @@ const CASES: &[Case] = &[
     (
         "a limit turned round",
         |t| &mut t.generic_sercos,
-        "idn = \"S-0-0039\", direction = \"both\", missing = \"shadow\"",
-        "idn = \"S-0-0039\", direction = \"both\", missing = \"shadow\", factor = [-1, 1]",
+        "idn = \"S-0-0039\", direction = \"both\"",
+        "idn = \"S-0-0039\", direction = \"both\", factor = [-1, 1]",
         code::WRONG_SIGN,
         "factor",
     ),
@@ -359,7 +359,7 @@ const CASES: &[Case] = &[
     (
         "a parameter that nobody binds",
         |t| &mut t.generic_cia402,
-        "  { parameter = \"standstill_window\", object = \"606F:00\", direction = \"both\", missing = \"shadow\", source = \"SSC KM OM TS\" },\n",
+        "  { parameter = \"standstill_window\", object = \"606F:00\", direction = \"both\", source = \"SSC KM OM TS\" },\n",
         "",
         code::NOTHING_BOUND,
         "mapping",
@@ -443,6 +443,22 @@ const CASES: &[Case] = &[
         "pattern = [0x3F, 0x3B], name = \"inch per second cubed, parameters\"",
         code::WRONG_SCALE,
         "scaling",
+    ),
+    (
+        "a value that nobody goes by",
+        |t| &mut t.cip_generic,
+        "parameter = \"velocity_feed_forward_gain\"",
+        "parameter = \"velocity_feed_forward_gain\", missing = \"device\"",
+        code::POLICY_WEAK,
+        "missing",
+    ),
+    (
+        "one more attribute without effect",
+        |t| &mut t.cip_generic,
+        "attribute = \"Control Method\", served_by = \"constant\", value = 2",
+        "attribute = \"Control Method\", served_by = \"stored\"",
+        code::POLICY_WEAK,
+        "served_by",
     ),
     (
         "over-current as a warning",

@@ -40,10 +40,10 @@ fn the_example_of_the_documentation_does_what_it_says() {
     let jerk = |mapping: &Mapping| {
         let rows = mapping.tables().generic_sercos.rows.parameter.iter();
         let row = rows.clone().find(|row| row.parameter.get_ref() == "jerk_limit").unwrap();
-        (row.missing.get_ref().clone(), row.idn.get_ref().clone(), rows.count())
+        (row.missing.as_ref().map(|word| word.get_ref().clone()), row.idn.get_ref().clone(), rows.count())
     };
     let (_, idn, rows) = jerk(shipped());
-    assert_eq!(jerk(&mapping), ("reject".to_owned(), idn, rows), "only one key has changed");
+    assert_eq!(jerk(&mapping), (Some("reject".to_owned()), idn, rows), "only one key has changed");
     let kvp = mapping.dictionaries.cip.attribute("Kvp").unwrap().id;
     assert!(mapping.cip.rejected.iter().any(|(id, _)| *id == kvp));
     assert!(!mapping.cip.attributes.iter().any(|row| row.attribute.id == kvp));
@@ -61,7 +61,7 @@ fn an_attribute_that_is_served_is_rejected_no_more() {
     let id = shipped().dictionaries.cip.attribute(name).unwrap().id;
     assert!(shipped().cip.rejected.iter().any(|(known, _)| *known == id));
     let row = format!(
-        "[[cip-generic.attribute]]\nattribute = \"{name}\"\nserved_by = \"shadow\"\nsource = \"test\"\n"
+        "[[cip-generic.attribute]]\nattribute = \"{name}\"\nserved_by = \"device\"\nsource = \"test\"\n"
     );
     let mapping = good(&row);
     assert!(!mapping.cip.rejected.iter().any(|(known, _)| *known == id));
@@ -91,14 +91,15 @@ fn rows_go_and_keys_of_rows_go() {
 
 #[test]
 fn the_last_overlay_counts_and_single_tables_change_by_key() {
-    let one = "format = 1\noverlay = \"a\"\n[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmissing = \"reject\"\n";
-    let two = "format = 1\noverlay = \"b\"\n[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\nmissing = \"shadow\"\n\
+    let one = "format = 1\noverlay = \"a\"\n[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\ndirection = \"from_drive\"\n";
+    let two = "format = 1\noverlay = \"b\"\n[[generic-sercos.parameter]]\nparameter = \"jerk_limit\"\ndirection = \"both\"\n\
                [generic-sercos.configurable_data]\nproducer = \"S-0-0188\"\n";
     let (mapping, findings) = over(&[one, two]);
     assert!(findings.is_empty(), "{findings}");
     let mapping = mapping.unwrap();
     assert_eq!(mapping.sercos.configurable, [Idn::standard(188); 2]);
-    assert!(!mapping.sercos.parameters.iter().any(|row| row.reject), "as shipped again");
+    let jerk = mapping.sercos.parameters.iter().find(|row| row.parameter == Parameter::JERK_LIMIT).unwrap();
+    assert!(jerk.to_drive && jerk.from_drive, "as shipped again");
 }
 
 /// Every list of the shipped files is known, and its keys tell its rows apart.

@@ -85,10 +85,11 @@ fn a_parameter_is_wrong_where_it_says_so() {
 /// Success without an effect is not possible by tables.
 #[test]
 fn a_parameter_is_never_kept_in_the_gateway() {
-    let shadow = "a value kept in the gateway has no effect";
-    for head in ["notch_frequency\"\nmissing", "direction = \"both\"\nmissing"] {
-        wrong(&format!("{head} = \"reject\""), &format!("{head} = \"shadow\""), &["own.toml", shadow]);
-    }
+    let kept = "a value kept in the gateway has no effect";
+    let head = "notch_frequency\"\nmissing";
+    wrong(&format!("{head} = \"reject\""), &format!("{head} = \"stored\""), &["own.toml", kept]);
+    let head = "direction = \"both\"\nmissing";
+    wrong(&format!("{head} = \"reject\""), &format!("{head} = \"stored\""), &["own.toml", "AX0012", "reject"]);
     wrong("\"both\"", "\"to_drive\"", &["expected `both` for notch_frequency", "`write`"]);
     wrong("\"both\"", "\"from_drive\"", &["expected `both` for notch_frequency"]);
     let disabled = EXAMPLE.replace("access = \"write\"", "access = \"write_while_disabled\"");

@@ -279,3 +279,47 @@ fn signals_of_a_cyclic_read_list_are_fresh_in_every_cycle_and_parameters_are_ref
     // The two axes have lists of their own.
     assert_eq!(rig.engine.devices()[0].device().attribute(1, 454), Ok(&[0; 4][..]));
 }
+
+/// Motor data and the gear are the drive's own. A controller may set them to what the drive has: it is told if it has others.
+#[test]
+fn what_only_the_drive_can_change_is_confirmed_or_refused_with_both_values_in_the_log() {
+    const RATED_CURRENT: u16 = 1319;
+    const GEAR_INPUT: u16 = 1371;
+    let (mut rig, client) = rig_in(AxisState::Stopped);
+    let mut ask = |service, id, value: &[u8]| client.ask(&mut rig, service, 1, Some(id), value);
+    let (status, gear) = ask(GET, GEAR_INPUT, &[]);
+    assert_eq!((status, gear.as_slice()), (OK, &1_u32.to_le_bytes()[..]));
+    assert_eq!(ask(SET, GEAR_INPUT, &gear).0, OK);
+    assert_eq!(ask(SET, GEAR_INPUT, &10_u32.to_le_bytes()).0, INVALID_VALUE);
+    assert_eq!(ask(GET, GEAR_INPUT, &[]).1, gear, "as it was");
+    let (status, current) = ask(GET, RATED_CURRENT, &[]);
+    assert_eq!(status, OK);
+    let amperes = f32::from_le_bytes(current.try_into().expect("a REAL"));
+    assert!(amperes > 1.0, "{amperes}");
+    // A thousandth is what the unit of a drive may round; a hundredth is another motor.
+    for (factor, expected) in [(1.0005, OK), (0.9995, OK), (1.01, INVALID_VALUE), (-1.0, INVALID_VALUE)] {
+        let status = ask(SET, RATED_CURRENT, &(amperes * factor).to_le_bytes()).0;
+        assert_eq!(status, expected, "{factor}");
+    }
+    let told = rig.told();
+    let said = "attribute 1371 cannot be set to 10: the drive has 1, and only it can change that";
+    assert!(told.contains(said), "{told}");
+    assert_eq!(told.matches("attribute 1319 cannot be set to").count(), 2, "{told}");
+}
+
+/// What Axisbridge does in one way only can be set to that way.
+#[test]
+fn what_is_always_so_can_be_set_to_nothing_else() {
+    let (mut rig, client) = rig_in(AxisState::Stopped);
+    let mut set = |id, value: &[u8]| client.ask(&mut rig, SET, 1, Some(id), value).0;
+    for (id, name, always, other) in [
+        (41, "Control Method: PI Vector", 2, 1),
+        (446, "Position Integrator Control", 0, 1),
+        (467, "Velocity Integrator Control", 0, 1),
+        (560, "Commutation Startup Method: From Feedback Type", 0, 1),
+        (1317, "Motor Polarity: Normal", 0, 1),
+        (1414, "Feedback 1 Polarity: Normal", 0, 1),
+    ] {
+        assert_eq!((set(id, &[always]), set(id, &[other])), (OK, INVALID_VALUE), "{name}");
+    }
+}

@@ -16,7 +16,7 @@ use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use profile_generic::quantity::Position;
 use profile_generic::sequence::StopPlan;
 use profile_generic::state::{Action, DriveState, Request};
-use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::time::{MonotonicTime, SystemTime};
 
 impl AxisChannel {
     // ---- owner ------------------------------------------------------------------------------------------------

@@ -13,9 +13,10 @@ use super::stopping_torque::{self, Comparison};
 use crate::engine::access::Access;
 use crate::engine::axis::AxisChannel;
 use crate::engine::bus::{Answer, Buses, Purpose};
+use crate::engine::notice::Notice;
 use crate::engine::parameter::{ParameterJob, ParameterJobs};
 use crate::mapping::{
-    self, AttributeEntry, AttributeTable, Backing, Mapping, ParameterEntry, SequenceAttributes,
+    self, AttributeEntry, AttributeTable, Backing, Mapping, Missing, ParameterEntry, SequenceAttributes,
 };
 
 /// Writes to the drive that may be under way for one axis.
@@ -29,6 +30,8 @@ pub(super) struct Accesses {
     writes: ArrayVec<(u32, u16, ArrayVec<u8, 8>), WRITES_MAX>,
     /// A Stopping Torque that is being compared with the drive's torque limits.
     comparison: Option<Comparison>,
+    /// Values that are being compared with those of the drive: ticket and bytes.
+    confirmations: ArrayVec<(u32, ArrayVec<u8, 8>), WRITES_MAX>,
     /// Values that are computed from what the drive has.
     computed: ParameterJobs<Computed>,
 }
@@ -64,9 +67,9 @@ impl Accesses {
         mapping: &Mapping,
     ) -> Result<(), GeneralStatus> {
         let entry = *on.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
-        let (parameter, reject) = match entry.backing {
+        let (parameter, missing) = match entry.backing {
             Backing::Signal { .. } => return on.read_signal(access),
-            Backing::Parameter { parameter, reject, .. } => (parameter, reject),
+            Backing::Parameter { parameter, missing, .. } => (parameter, missing),
             _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
         };
         let program = on.axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
@@ -74,7 +77,7 @@ impl Accesses {
             return self.compute(access, &entry, parameter);
         }
         let Some(held) = program.parameter(parameter) else {
-            if reject || program.rejects(parameter) {
+            if missing == Missing::Absent {
                 return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
             }
             if let AccessOperation::Write(bytes) = &access.operation
@@ -82,30 +85,40 @@ impl Accesses {
             {
                 return self.compare(on, access, bytes, &entry, buses);
             }
-            return on.shadow(access);
+            return on.keep(access);
         };
         if held.to_drive.is_none() && entry.access != mapping::Access::Get {
             match (&access.operation, parameter.is_of_vendor()) {
-                // The drive lets the parameter only be read: what the controller sets is kept beside it.
-                (_, false) => return on.shadow(access),
+                // The drive lets the parameter only be read: it can be set to what the drive has.
+                (AccessOperation::Write(bytes), false) => return self.confirm(on, access, bytes, held, buses),
                 (AccessOperation::Write(_), true) => return Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE),
-                (AccessOperation::Read(_), true) => {}
+                (AccessOperation::Read(_), _) => {}
             }
         }
         let (request, write) = match &access.operation {
             AccessOperation::Read(_) => (Access::read(held.item), false),
             AccessOperation::Write(bytes) => (on.write(&entry, bytes, parameter, held)?, true),
         };
-        let (ticket, attribute) = (access.ticket, access.id);
-        let purpose = Purpose::Attribute { ticket, device: on.number, attribute, write };
-        if !buses.access(on.axis_number, &request, purpose) {
-            let is_gone = on.axis.feedback().report == Report::Silent;
-            return Err(match is_gone {
-                true => GeneralStatus::DEVICE_STATE_CONFLICT,
-                false => GeneralStatus::RESOURCE_UNAVAILABLE,
-            });
-        }
+        on.ask(access, &request, write, buses)?;
         self.note_write(access, &mapping.cip.sequence);
+        Ok(())
+    }
+
+    /// Compares a value with that of the drive, which lets it only be read.
+    fn confirm(
+        &mut self,
+        on: &mut Accessed<'_>,
+        access: &AttributeAccess,
+        bytes: &[u8],
+        held: &ParameterEntry,
+        buses: &mut Buses,
+    ) -> Result<(), GeneralStatus> {
+        if self.confirmations.is_full() {
+            return Err(GeneralStatus::RESOURCE_UNAVAILABLE);
+        }
+        let bytes = ArrayVec::try_from(bytes).map_err(|_| GeneralStatus::TOO_MUCH_DATA)?;
+        on.ask(access, &Access::read(held.item), true, buses)?;
+        self.confirmations.push((access.ticket, bytes));
         Ok(())
     }
 
@@ -191,6 +204,7 @@ impl Accesses {
         on: &mut Accessed<'_>,
         answer: &Answer,
         (ticket, attribute, write): (u32, u16, bool),
+        notice: &mut dyn FnMut(Notice),
     ) {
         if let Some(at) = self.writes.iter().position(|(of, ..)| *of == ticket) {
             let (_, id, value) = self.writes.remove(at);
@@ -212,10 +226,13 @@ impl Accesses {
             return;
         }
         let mut bytes = [0; 8];
-        let result = match &answer.result {
-            Err(failure) => Err(refusal(*failure)),
-            Ok(_) if write => Ok(0),
-            Ok((data, _)) => on.read(attribute, data, &mut bytes),
+        let confirmation = self.confirmations.iter().position(|(of, _)| *of == ticket);
+        let wanted = confirmation.map(|at| self.confirmations.remove(at).1);
+        let result = match (&answer.result, &wanted) {
+            (Err(failure), _) => Err(refusal(*failure)),
+            (Ok((data, _)), Some(wanted)) => on.confirm(attribute, wanted, data, notice),
+            (Ok(_), None) if write => Ok(0),
+            (Ok((data, _)), None) => on.read(attribute, data, &mut bytes),
         };
         on.device.complete_attribute(ticket, result.map(|len| &bytes[..len]));
     }
@@ -232,8 +249,49 @@ impl Accessed<'_> {
         Ok(())
     }
 
+    /// Hands a request to the drive.
+    fn ask(
+        &self,
+        access: &AttributeAccess,
+        request: &Access,
+        write: bool,
+        buses: &mut Buses,
+    ) -> Result<(), GeneralStatus> {
+        let (ticket, attribute) = (access.ticket, access.id);
+        let purpose = Purpose::Attribute { ticket, device: self.number, attribute, write };
+        if buses.access(self.axis_number, request, purpose) {
+            return Ok(());
+        }
+        let is_gone = self.axis.feedback().report == Report::Silent;
+        Err(if is_gone { GeneralStatus::DEVICE_STATE_CONFLICT } else { GeneralStatus::RESOURCE_UNAVAILABLE })
+    }
+
+    /// Whether the drive has the value that the controller would set.
+    fn confirm(
+        &self,
+        attribute: u16,
+        wanted: &[u8],
+        data: &[u8],
+        notice: &mut dyn FnMut(Notice),
+    ) -> Result<usize, GeneralStatus> {
+        let mut bytes = [0; 8];
+        let len = self.read(attribute, data, &mut bytes)?;
+        let entry = self.attributes.get(attribute).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        let held = bytes.get(..len).unwrap_or(&[]);
+        if entry.agree(wanted, held) {
+            return Ok(0);
+        }
+        notice(Notice::NotEqual {
+            axis: u8::try_from(self.axis_number).unwrap_or(u8::MAX),
+            attribute,
+            wanted: entry.number(wanted),
+            held: entry.number(held),
+        });
+        Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)
+    }
+
     /// A parameter that the drive lacks: kept and given back.
-    fn shadow(&mut self, access: &AttributeAccess) -> Result<(), GeneralStatus> {
+    fn keep(&mut self, access: &AttributeAccess) -> Result<(), GeneralStatus> {
         match &access.operation {
             AccessOperation::Read(_) => {
                 let mut bytes = [0; 8];

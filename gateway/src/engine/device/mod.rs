@@ -304,7 +304,12 @@ impl DeviceChannel {
     }
 
     /// Takes the drive's answer to an attribute access; `false` when it is another device's.
-    pub fn answer(&mut self, answer: &Answer, axes: &[AxisChannel]) -> bool {
+    pub fn answer(
+        &mut self,
+        answer: &Answer,
+        axes: &[AxisChannel],
+        notice: &mut dyn FnMut(Notice),
+    ) -> bool {
         let Purpose::Attribute { ticket, device, attribute, write } = answer.purpose else { return false };
         if device != self.number {
             return false;
@@ -315,7 +320,7 @@ impl DeviceChannel {
             return false;
         };
         let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-        accesses.answer(&mut on, answer, (ticket, attribute, write));
+        accesses.answer(&mut on, answer, (ticket, attribute, write), notice);
         true
     }
 

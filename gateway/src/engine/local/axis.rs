@@ -13,7 +13,6 @@
 
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, CommandSet, StatusBits};
-use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::sequence::SequenceStep;

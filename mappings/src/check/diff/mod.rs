@@ -511,15 +511,14 @@ fn sercos(mapping: &Mapping) -> Vec<Fact<'_>> {
         reader.say(("fault", &id), Aspect::Fault, says, row.cause.span());
     }
     for row in &rows.parameter {
-        parameter(&mut reader, &row.parameter, &row.idn, row.factor.as_ref(), &row.missing);
+        parameter(&mut reader, &row.parameter, &row.idn, row.factor.as_ref());
     }
     reader.facts
 }
 
-fn parameter(reader: &mut Reader<'_>, name: &Name, place: &Name, factor: Option<&RatioRow>, missing: &Name) {
+fn parameter(reader: &mut Reader<'_>, name: &Name, place: &Name, factor: Option<&RatioRow>) {
     let id = ("parameter", name.get_ref().as_str());
     reader.named(id, Aspect::Binding, place);
-    reader.named(id, Aspect::Missing, missing);
     let one = Spanned::new(name.span(), [1, 1]);
     let fact = reader.scale(id, factor.unwrap_or(&one), 0, "");
     if fact.number.is_some_and(|number| number < 0.0) {
@@ -624,7 +623,7 @@ fn cia402(mapping: &Mapping) -> Vec<Fact<'_>> {
         }
     }
     for row in &rows.parameter {
-        parameter(&mut reader, &row.parameter, &row.object, row.factor.as_ref(), &row.missing);
+        parameter(&mut reader, &row.parameter, &row.object, row.factor.as_ref());
     }
     reader.facts
 }

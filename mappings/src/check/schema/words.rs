@@ -13,6 +13,7 @@ use crate::dictionary::{
     Access, Cia402Access, Cia402Category, Cia402Kind, Cia402Pdo, Cia402RangeKind, Cia402SetKind, Cia402Type,
     CipType, Clearing, Confidence, GroupKind, IdnFormat, Layout, RangeKind,
 };
+use crate::cip_tables::MISSING;
 use crate::drive_rows::{CYCLIC_WAYS, FAILS, REFUSED, REJECTED};
 use crate::generic_names::WAYS;
 use crate::{CipConditions, Mapping, Reference, VOLTAGE_BIT};
@@ -112,11 +113,12 @@ fn of_builders(row: &str, key: &str) -> Option<Vec<&'static str>> {
         ("CyclicRow", "missing") => vec!["absent", "zero"],
         ("SercosModeRow" | "Cia402ModeRow", "missing") => named(&REFUSED),
         (_, "missing") if cyclic => named(&REFUSED),
+        ("CipAttributeRow", "missing") => named(&MISSING),
         (_, "missing") => named(&REJECTED),
         (_, "refused") => named(&FAILS),
         (_, "interpolation") => vec!["controller", "drive"],
         (_, "voltage_bit") => named(&VOLTAGE_BIT),
-        (_, "served_by") => vec!["device", "connection", "shadow", "constant"],
+        (_, "served_by") => vec!["device", "connection", "stored", "constant"],
         (_, "found_by") => vec!["box", "device"],
         (_, "drive_action") => named(&DRIVE_ACTIONS),
         ("UnitRow", "times") => vec!["motion_count", "motion_unit"],

@@ -9,7 +9,13 @@ use crate::Mapping;
 use crate::dictionary::Access;
 use crate::finding::Findings;
 use crate::finding::registry::POLICY_WEAK;
-use crate::format::Name;
+use crate::format::{CipAttributeRow, Name};
+
+/// Attributes that may be accepted without effect, all together.
+const STORED_MAX: usize = 20;
+
+/// The parameter of an attribute that the gateway compares with others where a drive has none.
+const STOPPING_TORQUE: &str = "stopping_torque";
 
 pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_sercos;
@@ -137,18 +143,38 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
     for row in &file.rows.attribute {
         let Some(attribute) = mapping.dictionaries.cip.attribute(row.attribute.get_ref()) else { continue };
         // What a controller only reads cannot be what it has set.
-        let read_only = attribute.access == Access::Get;
-        if let Some(missing) =
-            row.missing.as_ref().filter(|missing| read_only && missing.get_ref() == "shadow")
-        {
+        if let Some(missing) = row.missing.as_ref().filter(|missing| attribute.access == Access::Get && missing.get_ref() != "reject") {
             let what = [
                 format!("`{}` is not told as missing", attribute.name),
                 "of a drive without the parameter the controller would read a value that nobody has"
                     .to_owned(),
-                "write `missing = \"reject\"`".to_owned(),
+                "remove `missing`".to_owned(),
             ];
             reporter.report(POLICY_WEAK, ("missing", missing.span()), what);
         }
+        if let Some(missing) = row.missing.as_ref().filter(|missing| missing.get_ref() == "device")
+            && !goes_by(mapping, row, attribute.id)
+        {
+            let what = [
+                format!("`{}` would be accepted without effect", attribute.name),
+                "the gateway goes by the attributes of [sequence] and by Stopping Torque alone".to_owned(),
+                "remove `missing`".to_owned(),
+            ];
+            reporter.report(POLICY_WEAK, ("missing", missing.span()), what);
+        }
+    }
+    let stored = |word: &&Name| word.get_ref() == "stored";
+    let stored = file.rows.attribute.iter().filter_map(|row| {
+        let word = row.served_by.as_ref().filter(stored).or(row.missing.as_ref().filter(stored));
+        word.map(|word| (row, word))
+    });
+    for (row, word) in stored.skip(STORED_MAX) {
+        let what = [
+            format!("`{}` would be accepted without effect", row.attribute.get_ref()),
+            format!("there are {STORED_MAX} attributes already that have none"),
+            "remove the row, or name what it does".to_owned(),
+        ];
+        reporter.report(POLICY_WEAK, ("served_by", word.span()), what);
     }
     for row in &file.rows.fault {
         if let Some(default) = row.default.as_ref().filter(|action| action.get_ref() == "Ignore") {
@@ -160,4 +186,19 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
             reporter.report(POLICY_WEAK, ("default", default.span()), what);
         }
     }
+}
+
+/// Whether the gateway does something with the value of an attribute where the drive has no parameter for it.
+fn goes_by(mapping: &Mapping, row: &CipAttributeRow, id: u16) -> bool {
+    let sequence = &mapping.cip.sequence;
+    let ids = [
+        sequence.stopping_time_limit,
+        sequence.coasting_time_limit,
+        sequence.brake_release_delay,
+        sequence.brake_engage_delay,
+        sequence.zero_speed,
+        sequence.zero_speed_time,
+        sequence.ramp_deceleration,
+    ];
+    ids.contains(&id) || row.parameter.as_ref().is_some_and(|name| name.get_ref() == STOPPING_TORQUE)
 }

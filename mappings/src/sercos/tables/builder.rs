@@ -588,7 +588,7 @@ impl<'a> Builder<'a> {
 
     fn parameter(&mut self, row: &SercosParameterRow) {
         let generic = &self.dictionaries.generic;
-        let words = (&row.direction, &row.missing, row.factor.as_ref());
+        let words = (&row.direction, row.missing.as_ref(), row.factor.as_ref());
         let rule = parameter_row(&mut self.resolver, generic, &row.parameter, words);
         let idn = self.idn("idn", &row.idn);
         let (Some(rule), Some(idn)) = (rule, idn) else { return };
