@@ -63,11 +63,13 @@ def main(address):
         result["axis_state"] = get(driver, MOTION_AXIS, 1, 650)
         result["axis_missing_instance"] = get(driver, MOTION_AXIS, 77, 650)
         result["axis_missing_attribute"] = get(driver, MOTION_AXIS, 1, 9999)
-        # Transmission Ratio Output, which the box only keeps: Set, Get, and what must be refused.
-        result["set_shadow"] = ask(
-            driver, Services.set_attribute_single, MOTION_AXIS, 1, 1372, struct.pack("<i", 7)
-        )
-        result["get_shadow"] = get(driver, MOTION_AXIS, 1, 1372)
+        # Transmission Ratio Output, which only the drive can change: what it is, and what must be refused.
+        result["gear"] = get(driver, MOTION_AXIS, 1, 1372)
+        for name, value in [("set_gear_as_it_is", 1), ("set_another_gear", 7)]:
+            result[name] = ask(
+                driver, Services.set_attribute_single, MOTION_AXIS, 1, 1372, struct.pack("<i", value)
+            )
+        result["gear_after"] = get(driver, MOTION_AXIS, 1, 1372)
         result["set_short"] = ask(driver, Services.set_attribute_single, MOTION_AXIS, 1, 1372, b"\x00\x00")
         result["set_read_only"] = ask(driver, Services.set_attribute_single, MOTION_AXIS, 1, 650, b"\x00")
         # Get_Attribute_List of the Identity: vendor, an attribute that nobody has, serial number.

@@ -86,8 +86,9 @@ fn pycomm3_reads_and_writes_by_every_way_it_knows() {
         ("dscp_urgent", "37"),
         ("axis_revision", "0400"),
         ("axis_state", "00"),
-        ("set_shadow", ""),
-        ("get_shadow", "07000000"),
+        ("gear", "01000000"),
+        ("set_gear_as_it_is", ""),
+        ("gear_after", "01000000"),
         // Axis State 0 padded to four octets, Axis Faults 0; each behind ID, dimension and element size.
         ("axis_list", "020000008a02000100000000910200080000000000000000"),
         // The same answers over the class 3 connection.
@@ -98,6 +99,7 @@ fn pycomm3_reads_and_writes_by_every_way_it_knows() {
     }
     for (what, error) in [
         ("axis_missing_attribute", "Attribute not supported"),
+        ("set_another_gear", "Error in data segment or invalid attribute value"),
         ("set_short", "Insufficient command data"),
         ("set_read_only", "Attribute not settable"),
     ] {

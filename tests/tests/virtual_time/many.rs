@@ -57,6 +57,38 @@ fn sixty_four_axes_of_four_devices_on_mixed_buses_go_where_four_controllers_send
     }
 }
 
+/// Clause 2-1.5: drives of a controller may have device update periods of their own. Two axes that get the same commands, one on SERCOS at
+/// 2 ms and one on CANopen at 8 ms, are at the same places at the same times.
+#[test]
+fn drives_of_different_cycles_follow_one_curve_together() {
+    for period_us in [4_000, 8_000] {
+        let mut many = Many::ready(Crowd { sercos: 1, can: &[1], devicenet: &[] });
+        assert_eq!(many.axis_count(), 2);
+        many.connect(period_us, |_, axes| {
+            let go = |axis| Step::MoveAbsolute { axis, position: 3.0, limits: LIMITS };
+            vec![
+                Step::Enable(all(axes)),
+                Step::Together(vec![go(1), go(2)]),
+                Step::Dwell { seconds: 1.0 },
+                Step::Disable(all(axes)),
+            ]
+        });
+        many.run_until(millis(30_000), "constant velocity", |many| many.position(0) > 1_000_000_000);
+        let mut apart = Vec::new();
+        many.run_until(millis(2_000), "the end of constant velocity", |many| {
+            apart.push(many.position(0) - many.position(1));
+            many.position(0) > 2_000_000_000
+        });
+        let (least, most) = (apart.iter().min().copied(), apart.iter().max().copied());
+        println!("{period_us} us: {least:?} to {most:?} of {}", apart.len());
+        assert!(apart.len() > 500, "{period_us}");
+        many.run_until(millis(30_000), "the end", Many::is_closed);
+        for report in many.reports() {
+            assert_eq!((report.failure, report.lost_updates), (None, 0), "{}", many.told());
+        }
+    }
+}
+
 /// The titles of the errors that `check` finds in a configuration.
 fn errors(name: &str, crowd: Crowd) -> Vec<String> {
     let path = std::env::temp_dir().join(format!("axisbridge-{name}-{}.toml", std::process::id()));
