@@ -296,9 +296,7 @@ impl AttributeEntry {
     #[must_use]
     pub fn agree(&self, a: &[u8], b: &[u8]) -> bool {
         match (self.number(a), self.number(b)) {
-            (Some(Number::Real(a)), Some(Number::Real(b))) => {
-                (a - b).abs() <= a.abs().max(b.abs()) * SAME
-            }
+            (Some(Number::Real(a)), Some(Number::Real(b))) => (a - b).abs() <= a.abs().max(b.abs()) * SAME,
             (a, b) => a == b,
         }
     }

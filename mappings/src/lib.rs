@@ -87,6 +87,7 @@ mod overlay;
 mod resolver;
 mod rows;
 mod sercos;
+mod truth;
 mod twice;
 
 #[cfg(test)]
@@ -146,6 +147,7 @@ pub use sercos::facts::{Difference, DriveFacts};
 pub use sercos::fixed_connections::{FixedConnection, FixedConnections};
 pub use sercos::scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
 pub use sercos::tables::{ReportRule, SercosTables};
+pub use truth::{AttributeTruth, Truth};
 
 use crate::finding::{Findings, Severity};
 use profile_cip::device::attribute::{DefaultValue, ElementRule};

@@ -2,6 +2,7 @@
 //!
 //! Data goes to standard output, errors and progress to standard error. Exit status 0 is success, 1 findings or failure, 2 usage.
 
+mod attributes;
 mod check;
 mod decode;
 mod demo;
@@ -49,6 +50,8 @@ enum Command {
     Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
     Eds(EdsArguments),
+    /// Show what each attribute of an axis is: live, compared, computed, stored or absent.
+    Attributes(AttributesArguments),
     /// Check whether this host is fit for the gateway and its cycles.
     Doctor(DoctorArguments),
     /// List the drives on a bus, and print a first configuration.
@@ -184,6 +187,24 @@ struct EdsArguments {
     /// Write each sheet into this folder as NAME.eds. Without it, a single sheet goes to standard output.
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
+}
+
+/// Arguments of `attributes`.
+#[derive(Debug, Args)]
+struct AttributesArguments {
+    /// The configuration of the gateway (TOML).
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Only the axis with this name.
+    #[arg(long, value_name = "NAME")]
+    axis: Option<String>,
+    /// Values that the drives of the machine have: a list of `idn` and `object` lines. Without it, the values are those of
+    /// simulated drives.
+    #[arg(long, value_name = "FILE")]
+    values: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Arguments of `doctor`.
@@ -593,6 +614,7 @@ pub fn main() -> ExitCode {
         Command::Status(arguments) => status::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
+        Command::Attributes(arguments) => attributes::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),

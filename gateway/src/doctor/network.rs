@@ -197,9 +197,7 @@ fn stamps(name: &str, granted: bool, features: &Features) -> Check {
     let what = format!("time stamps of {name}");
     let hardware = features.time_stamps.is_some_and(|stamps| stamps.hardware);
     match (granted, hardware) {
-        (true, true) => {
-            Check::good(AREA, what, "by the kernel; those of the card are for PTP alone")
-        }
+        (true, true) => Check::good(AREA, what, "by the kernel; those of the card are for PTP alone"),
         (true, false) => Check::good(AREA, what, "by the kernel"),
         (false, _) => Check::doubtful(
             AREA,

@@ -26,8 +26,9 @@ pub const READY_TIME_OUT: DurationNs = DurationNs::from_secs(30);
 /// Connection time-out: 32 update periods, since hosts without real-time kernels miss some now and then.
 const TIMEOUT_MULTIPLIER: u8 = 3;
 
-/// Controller Update Delay High Limit and Low Limit, in update periods.
-const DELAY_LIMITS: (u8, u8) = (10, 4);
+/// Controller Update Delay High Limit and Low Limit, in update periods. With a higher one axes go on for longer without a command, and
+/// have more to catch up with when the next one comes.
+const DELAY_LIMITS: (u8, u8) = (4, 4);
 
 /// A controller for axes with these counts in a unit. No axis is cyclic, whatever the box has it for: [`make_cyclic`].
 #[must_use]

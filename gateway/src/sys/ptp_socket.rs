@@ -177,7 +177,9 @@ impl PtpSockets {
         while let Some(message) = receive(self.event.as_fd(), buffer)? {
             // Without the time of its receipt an event message says nothing.
             let at = match &self.card {
-                Ok(card) if is_event(buffer.get(..message.len).unwrap_or(&[])) => card.received(message.card).map_err(io::Error::other)?,
+                Ok(card) if is_event(buffer.get(..message.len).unwrap_or(&[])) => {
+                    card.received(message.card).map_err(io::Error::other)?
+                }
                 Ok(_) => None,
                 Err(_) => message.at.and_then(exactly_monotonic),
             };

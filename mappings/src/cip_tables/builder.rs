@@ -11,8 +11,8 @@ use profile_generic::sequence::{StopMethod, StopPlan};
 use profile_generic::state::{DriveState, Request};
 
 use super::{
-    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, Finder, MISSING, Missing, ScalingAttributes,
-    SequenceAttributes, Served, ServedAttribute, Times, has_direction,
+    CipTables, CipUnit, CyclicElement, DisplacementUnit, ExceptionRow, Finder, MISSING, Missing,
+    ScalingAttributes, SequenceAttributes, Served, ServedAttribute, Times, has_direction,
 };
 use crate::cip_events::{EventRule, EventTrigger};
 use crate::compile_cip::{

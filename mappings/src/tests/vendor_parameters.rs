@@ -89,7 +89,11 @@ fn a_parameter_is_never_kept_in_the_gateway() {
     let head = "notch_frequency\"\nmissing";
     wrong(&format!("{head} = \"reject\""), &format!("{head} = \"stored\""), &["own.toml", kept]);
     let head = "direction = \"both\"\nmissing";
-    wrong(&format!("{head} = \"reject\""), &format!("{head} = \"stored\""), &["own.toml", "AX0012", "reject"]);
+    wrong(
+        &format!("{head} = \"reject\""),
+        &format!("{head} = \"stored\""),
+        &["own.toml", "AX0012", "reject"],
+    );
     wrong("\"both\"", "\"to_drive\"", &["expected `both` for notch_frequency", "`write`"]);
     wrong("\"both\"", "\"from_drive\"", &["expected `both` for notch_frequency"]);
     let disabled = EXAMPLE.replace("access = \"write\"", "access = \"write_while_disabled\"");

@@ -185,7 +185,8 @@ fn explicit_traffic(capture: &Path) {
     let packed = "8a,8e,8e,8e 1e,00,14,00".to_owned();
     let mut wanted = vec!["81 00".to_owned()];
     wanted.extend(std::iter::repeat_n(get("00"), 6));
-    wanted.extend([get("05"), get("14"), "90 00".to_owned(), get("00"), "90 13".to_owned()]);
+    wanted.extend([get("05"), get("14"), get("00"), "90 00".to_owned(), "90 09".to_owned(), get("00")]);
+    wanted.push("90 13".to_owned());
     wanted.extend(["90 0e", "83 0a", "cb 00"].map(str::to_owned));
     wanted.extend([packed.clone(), "db 00".to_owned(), get("00"), get("00"), packed, "ce 00".to_owned()]);
     assert_eq!(answers, wanted);

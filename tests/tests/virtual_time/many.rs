@@ -57,10 +57,11 @@ fn sixty_four_axes_of_four_devices_on_mixed_buses_go_where_four_controllers_send
     }
 }
 
-/// Clause 2-1.5: drives of a controller may have device update periods of their own. Two axes that get the same commands, one on SERCOS at
-/// 2 ms and one on CANopen at 8 ms, are at the same places at the same times.
+/// Clause 2-1.5: drives of a controller may have device update periods of their own. Two axes get the same commands, one on SERCOS at 2 ms and
+/// one on CANopen at 8 ms. Each drive takes a set-point at its instant and is there a cycle later, so they are apart by the difference
+/// of their cycles, always in the same way.
 #[test]
-fn drives_of_different_cycles_follow_one_curve_together() {
+fn drives_of_different_cycles_follow_one_curve_apart_by_the_difference_of_their_cycles() {
     for period_us in [4_000, 8_000] {
         let mut many = Many::ready(Crowd { sercos: 1, can: &[1], devicenet: &[] });
         assert_eq!(many.axis_count(), 2);
@@ -79,9 +80,10 @@ fn drives_of_different_cycles_follow_one_curve_together() {
             apart.push(many.position(0) - many.position(1));
             many.position(0) > 2_000_000_000
         });
-        let (least, most) = (apart.iter().min().copied(), apart.iter().max().copied());
-        println!("{period_us} us: {least:?} to {most:?} of {}", apart.len());
-        assert!(apart.len() > 500, "{period_us}");
+        assert!(apart.len() > 500, "{period_us}: {}", apart.len());
+        // At a turn a second: 6 ms. A drive is looked at up to one of its steps after it has moved: 2 ms and 1 ms.
+        let out: Vec<_> = apart.iter().filter(|apart| !(5_000_000..=9_500_000).contains(*apart)).collect();
+        assert!(out.is_empty(), "{period_us} us: {out:?}");
         many.run_until(millis(30_000), "the end", Many::is_closed);
         for report in many.reports() {
             assert_eq!((report.failure, report.lost_updates), (None, 0), "{}", many.told());

@@ -90,7 +90,9 @@ impl Accesses {
         if held.to_drive.is_none() && entry.access != mapping::Access::Get {
             match (&access.operation, parameter.is_of_vendor()) {
                 // The drive lets the parameter only be read: it can be set to what the drive has.
-                (AccessOperation::Write(bytes), false) => return self.confirm(on, access, bytes, held, buses),
+                (AccessOperation::Write(bytes), false) => {
+                    return self.confirm(on, access, bytes, held, buses);
+                }
                 (AccessOperation::Write(_), true) => return Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE),
                 (AccessOperation::Read(_), _) => {}
             }

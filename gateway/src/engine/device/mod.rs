@@ -304,12 +304,7 @@ impl DeviceChannel {
     }
 
     /// Takes the drive's answer to an attribute access; `false` when it is another device's.
-    pub fn answer(
-        &mut self,
-        answer: &Answer,
-        axes: &[AxisChannel],
-        notice: &mut dyn FnMut(Notice),
-    ) -> bool {
+    pub fn answer(&mut self, answer: &Answer, axes: &[AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
         let Purpose::Attribute { ticket, device, attribute, write } = answer.purpose else { return false };
         if device != self.number {
             return false;

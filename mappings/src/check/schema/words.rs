@@ -8,12 +8,12 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::Quantity;
 use profile_generic::state::{Action, DriveState, Report, Request};
 
+use crate::cip_tables::MISSING;
 use crate::device_link::DRIVE_ACTIONS;
 use crate::dictionary::{
     Access, Cia402Access, Cia402Category, Cia402Kind, Cia402Pdo, Cia402RangeKind, Cia402SetKind, Cia402Type,
     CipType, Clearing, Confidence, GroupKind, IdnFormat, Layout, RangeKind,
 };
-use crate::cip_tables::MISSING;
 use crate::drive_rows::{CYCLIC_WAYS, FAILS, REFUSED, REJECTED};
 use crate::generic_names::WAYS;
 use crate::{CipConditions, Mapping, Reference, VOLTAGE_BIT};

@@ -143,7 +143,11 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
     for row in &file.rows.attribute {
         let Some(attribute) = mapping.dictionaries.cip.attribute(row.attribute.get_ref()) else { continue };
         // What a controller only reads cannot be what it has set.
-        if let Some(missing) = row.missing.as_ref().filter(|missing| attribute.access == Access::Get && missing.get_ref() != "reject") {
+        if let Some(missing) = row
+            .missing
+            .as_ref()
+            .filter(|missing| attribute.access == Access::Get && missing.get_ref() != "reject")
+        {
             let what = [
                 format!("`{}` is not told as missing", attribute.name),
                 "of a drive without the parameter the controller would read a value that nobody has"
