@@ -3,7 +3,7 @@
 //! | request | accesses |
 //! |---|---|
 //! | read | the value; of an IDN also name, unit, minimum and maximum |
-//! | write | the value as it is, the new value, the value again |
+//! | write | the value as it is, the new value, the value again; the unit of an IDN |
 //! | list | of a SERCOS drive its list of IDNs; of others none |
 
 use std::fmt::Write as _;
@@ -236,7 +236,7 @@ impl Job {
                 }
                 self.report.before = Some(before);
                 self.report.recommission = self.ask.id().is_some_and(rescales);
-                self.report(context)
+                self.ask_element(Element::Unit, context)
             }
             Asked::List => {
                 let ids = data
@@ -319,12 +319,13 @@ impl Job {
 
     /// Goes on behind an element.
     fn after(&mut self, element: Element, context: &Context<'_>) -> Step {
-        let brief = matches!(self.ask, Ask::Read { brief: true, .. });
+        // After a write, the unit is all that is asked for.
+        let brief = !matches!(self.ask, Ask::Read { brief: false, .. });
         let has_limits =
             self.attribute.is_some_and(|attribute| !attribute.is_command() && !attribute.is_list());
         match element {
             Element::Name if !brief => self.ask_element(Element::Unit, context),
-            Element::Unit if has_limits => self.ask_element(Element::Minimum, context),
+            Element::Unit if has_limits && !brief => self.ask_element(Element::Minimum, context),
             Element::Minimum => self.ask_element(Element::Maximum, context),
             _ => self.report(context),
         }
@@ -345,7 +346,7 @@ impl Job {
         };
         let text = match self.asked {
             Asked::Back => format!("{what}: written, and not read back: {failure}"),
-            Asked::Write if matches!(failure.code(), "unanswered") => {
+            Asked::Write if failure.code() == "unanswered" && *failure != DirectFailure::NoDrive => {
                 format!("{what}: it is not known whether the drive has taken the value: {failure}")
             }
             _ => format!("{what}: {failure}"),
@@ -509,6 +510,10 @@ mod tests {
                 vec![before(), gone()],
                 "error write x unanswered: S-0-0104: it is not known whether the drive has taken the value: the drive does not \
                  answer\n",
+            ),
+            (
+                vec![before(), (Err(DirectFailure::NoDrive), vec![])],
+                "error write x unanswered: S-0-0104: the drive is not there, or is not commissioned yet\n",
             ),
             (
                 vec![before(), (Ok(None), vec![]), gone()],
