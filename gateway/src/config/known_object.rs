@@ -72,3 +72,37 @@ fn data_type(data_type: DataType) -> Option<Cia402Type> {
         _ => return None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use profile_cia402::eds;
+
+    use super::*;
+
+    #[test]
+    fn a_data_sheet_names_objects_with_type_and_access() {
+        let text = "[FileInfo]\nFileName=own.eds\n[DeviceInfo]\nVendorName=Own\n[OptionalObjects]\nSupportedObjects=2\n1=0x6040\n\
+                    2=0x6081\n[ManufacturerObjects]\nSupportedObjects=1\n1=0x2100\n\
+                    [6040]\nParameterName=Controlword\nObjectType=0x7\nDataType=0x0006\nAccessType=rw\nPDOMapping=1\n\
+                    [6081]\nParameterName=Profile velocity\nObjectType=0x7\nDataType=0x0007\nAccessType=rw\nPDOMapping=0\n\
+                    [2100]\nParameterName=Own\nObjectType=0x8\nSubNumber=2\n\
+                    [2100sub0]\nParameterName=Entries\nObjectType=0x7\nDataType=0x0005\nAccessType=const\nPDOMapping=0\n\
+                    [2100sub1]\nParameterName=Angle\nObjectType=0x7\nDataType=0x0010\nAccessType=rw\nPDOMapping=0\n";
+        let reading = eds::read(text.as_bytes()).expect("a data sheet");
+        let objects = KnownObject::of_description(&reading.description);
+        let shown = objects.iter().map(|known| {
+            let kind = known.data_type.map_or("-", Cia402Type::name);
+            let access = known.access.map_or("-", Cia402Access::name);
+            format!("{} {} {kind} {access} {}", known.object, known.name, known.is_kept())
+        });
+        assert_eq!(
+            shown.collect::<Vec<_>>(),
+            [
+                "2100:00 Own: Entries u8 ro false",
+                "2100:01 Own: Angle - rw true",
+                "6040:00 Controlword u16 rw false",
+                "6081:00 Profile velocity u32 rw true"
+            ]
+        );
+    }
+}

@@ -31,7 +31,11 @@ impl Gateway {
         text.replace_range(modbus, "");
         let modes = "address = 1\nmodes = [\"position\", \"positioning\", \"homing\"]";
         assert_eq!(text.matches("address = 1\n").count(), 1, "{text}");
-        let text = text.replacen("address = 1", modes, 1);
+        Self::with(name, &text.replacen("address = 1", modes, 1))
+    }
+
+    /// Starts it with this configuration.
+    pub fn with(name: &str, text: &str) -> Self {
         let config = path(&format!("{name}.toml"));
         fs::write(&config, text).expect("the folder of the tests can be written to");
         let (socket, log) = (path(&format!("{name}.socket")), path(&format!("{name}.log")));

@@ -137,3 +137,39 @@ fn a_drive_is_replaced() {
         stop(gateway);
     });
 }
+
+/// A CANopen drive has no list of its own: the backup has what the tables know and the drive has.
+#[test]
+fn a_canopen_drive_is_backed_up_changed_and_restored() {
+    in_real_time("a_canopen_drive_is_backed_up_changed_and_restored", || {
+        let text = include_str!("../virtual_time/can.toml").replace("10.0.0.2", "127.0.0.89");
+        let gateway = Gateway::with("param-can", &text);
+        gateway.connect().until("status turntable", "ok status turntable state=inhibited owner=nobody ");
+        let file = path("param-can-backup.toml");
+        let _ = fs::remove_file(&file);
+        let name = file.to_str().expect("a path");
+        let printed = param(&gateway, &["backup", "turntable", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert!(printed.out.contains(" parameters of the list are not in this drive\n"), "{printed:?}");
+        let backup = fs::read_to_string(&file).expect("the backup");
+        assert!(backup.contains("id = \"6081:00\"\nname = \"Profile velocity\"\n"), "{backup}");
+        assert!(backup.contains("bus = \"canopen\"") && !backup.contains("6040:00"), "{backup}");
+        let before = param(&gateway, &["read", "turntable", "6081h"]);
+        let printed = param(&gateway, &["write", "turntable", "6081h", "4711"]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        let printed = param(&gateway, &["compare", "turntable", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(1), ""), "{printed:?}");
+        assert!(printed.out.contains("\n6081:00 ") && printed.out.contains(" 4711 "), "{printed:?}");
+        // A backup of one kind of bus is not for a drive of another one.
+        let other = changed(&file, "bus = \"canopen\"", "bus = \"sercos\"");
+        let printed = param(&gateway, &["restore", "turntable", &other, "--force"]);
+        assert_eq!((printed.code, printed.out.as_str()), (Some(1), ""));
+        assert_eq!(printed.errors, "the backup is of a drive on sercos, and this one is on canopen\n");
+        let printed = param(&gateway, &["restore", "turntable", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert!(printed.out.contains("\n1 of "), "{printed:?}");
+        assert_eq!(param(&gateway, &["read", "turntable", "6081h"]).out, before.out);
+        assert_eq!(param(&gateway, &["compare", "turntable", name]).code, Some(0));
+        stop(gateway);
+    });
+}

@@ -526,10 +526,12 @@ mod tests {
         ] {
             assert_eq!(steps(write(), answers).1, reply);
         }
-        let answers = vec![before(), (Ok(None), vec![]), (Ok(Some(gain())), vec![200, 0])];
-        assert!(
-            steps(write(), answers).1.contains("\"value\":\"2.00\",\"before\":\"1.50\",\"data\":\"c800\"")
-        );
+        let after = (Ok(Some(gain())), vec![200, 0]);
+        let (targets, reply) =
+            steps(write(), vec![before(), (Ok(None), vec![]), after, (Ok(None), b"A".to_vec())]);
+        assert_eq!(targets.last(), Some(&Target::Element(Idn::standard(104), Element::Unit)));
+        assert!(reply.contains("\"unit\":\"A\""), "{reply}");
+        assert!(reply.contains("\"value\":\"2.00\",\"before\":\"1.50\",\"data\":\"c800\""), "{reply}");
     }
 
     #[test]
