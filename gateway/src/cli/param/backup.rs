@@ -25,7 +25,7 @@ pub fn run(arguments: &BackupArguments) -> Result<ExitCode, CliError> {
     for (number, listed) in list.parameters.iter().enumerate() {
         progress.at(|| format!("reading {} of {count}: {}", number + 1, listed.id));
         match drive.read(&listed.id, true)? {
-            Found::Report(report) => backup.parameter.push(Kept::from(report)),
+            Found::Report(report) => backup.parameter.push(Kept::from(*report)),
             Found::Refused(refused) if refused.ends_all() => return Err(refused.text.into()),
             // A list of what drives can have, not of what this one has.
             Found::Refused(refused) if refused.code == "absent" && list.bus == "canopen" => absent += 1,

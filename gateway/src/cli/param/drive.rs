@@ -24,7 +24,7 @@ pub struct Drive {
 #[derive(Debug)]
 pub enum Found {
     /// The parameter.
-    Report(ParameterReport),
+    Report(Box<ParameterReport>),
     /// The gateway or the drive refused.
     Refused(Refused),
 }
@@ -161,7 +161,9 @@ impl Drive {
         let Some(words) = reply.strip_prefix(&format!("ok {request} {} ", self.axis)) else {
             return Ok(Found::Refused(refused(&reply)));
         };
-        report(words).map(Found::Report).ok_or_else(|| format!("unexpected reply `{reply}`").into())
+        report(words)
+            .map(|report| Found::Report(Box::new(report)))
+            .ok_or_else(|| format!("unexpected reply `{reply}`").into())
     }
 }
 

@@ -439,11 +439,11 @@ mod tests {
     use super::*;
     use crate::mapping::Mapping;
 
+    /// An answer of the engine: the result and the buffer.
+    type Said = (Result<Option<Attribute>, DirectFailure>, Vec<u8>);
+
     /// A job for a SERCOS drive, and what comes of these answers.
-    fn steps(
-        ask: Ask,
-        answers: Vec<(Result<Option<Attribute>, DirectFailure>, Vec<u8>)>,
-    ) -> (Vec<Target>, String) {
+    fn steps(ask: Ask, answers: Vec<Said>) -> (Vec<Target>, String) {
         let catalogue = Catalogue::new(vec![Bus::Sercos], &Mapping::embedded().unwrap());
         let context = Context {
             axis: "x",
