@@ -6,8 +6,9 @@ use std::rc::Rc;
 
 use allocation_counter::{measure, opt_out};
 use axisbridge::config::Config;
+use axisbridge::engine::direct::{DirectNorth, DirectRequest, Direction, Target};
 use axisbridge::engine::notice::Notice;
-use axisbridge::mapping::{Mapping, Told};
+use axisbridge::mapping::{Mapping, Object, Told};
 use axisbridge::simulate::drives::linear;
 use axisbridge::status::BoxState;
 use axisbridge::translate::Stage;
@@ -38,7 +39,9 @@ use profile_generic::state::Action;
 use profile_sercos::master::event::Event as SercosEvent;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::{Config as SlaveConfig, Slave};
+use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::scp::{ScpClass, ScpEntry};
+use profile_sercos::wire::svc::Element;
 
 /// Calls of the engine in a cycle of the bus: to build it, and to send it at its instant.
 const CALLS: u32 = 2;
@@ -300,6 +303,45 @@ fn cycles_with_two_can_axes_in_motion_allocate_nothing() {
     assert_eq!(weigh(&mut rig, 4_000, |_, _| ()), []);
     assert!(rig.engine.axes().iter().all(|axis| axis.counters().commands > 900), "both axes were led");
     assert!((0..2).all(|device| turns(&rig, device)));
+}
+
+/// Direct accesses of local control bring their buffers and take them away again: long values, and writes that are refused.
+#[test]
+fn direct_accesses_to_drives_in_motion_allocate_nothing() {
+    let targets = [
+        Target::Element(Idn::standard(17), Element::Data),
+        Target::Element(Idn::standard(104), Element::Name),
+        Target::Object(Object { index: 0x1008, sub: 0 }),
+    ];
+    for (mut rig, answered) in
+        [(in_motion(Settings::default()), [true, true, false]), (on_can(None), [false, false, true])]
+    {
+        let (direct, mut end) = DirectNorth::new();
+        rig.engine.set_direct(direct);
+        let mut counts = [0_u32; 3];
+        let mut refused = 0;
+        let found = weigh(&mut rig, 3_000, |_, number| {
+            while let Ok(answer) = end.answers.pop() {
+                match answer.result {
+                    Ok(_) => counts[usize::try_from(answer.id).expect("small")] += 1,
+                    Err(_) => refused += 1,
+                }
+            }
+            if number % 10 == 0 {
+                let place = number / 10 % 3;
+                let target = targets[usize::try_from(place).expect("small")];
+                let direction =
+                    if number % 100 == 0 { Direction::Write { rescales: true } } else { Direction::Read };
+                let data = Vec::with_capacity(4_096);
+                let request = DirectRequest { client: 1, id: place, axis: 0, target, direction, data };
+                // A full queue is tried again.
+                let _ = end.requests.push(request);
+            }
+        });
+        assert_eq!(found, []);
+        assert_eq!(counts.map(|count| count > 3), answered, "{counts:?}");
+        assert!(refused > 3, "a controller has the axis, and other buses have other numbers: {refused}");
+    }
 }
 
 /// The first drive has no torque to tell, and gets other PDOs than those that were planned.

@@ -9,6 +9,8 @@ mod demo;
 mod dictionary;
 mod doctor;
 mod eds;
+mod gateway_client;
+mod param;
 mod progress;
 mod report;
 mod run;
@@ -46,6 +48,9 @@ enum Command {
     Run(RunArguments),
     /// Show what a running gateway does now: buses, system time, axes and faults.
     Status(StatusArguments),
+    /// Read, write, back up, restore and compare the parameters of a drive, through the running gateway.
+    #[command(subcommand)]
+    Param(param::ParamCommand),
     /// Check mapping tables, overlays and a configuration, and explain the findings.
     Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
@@ -612,6 +617,7 @@ pub fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
+        Command::Param(command) => param::run(&command),
         Command::Check(arguments) => check::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
         Command::Attributes(arguments) => attributes::run(&arguments),

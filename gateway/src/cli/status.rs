@@ -1,13 +1,12 @@
 //! `axisbridge status`: what a running gateway does now, over its local socket.
 
 use std::fmt::Write as _;
-use std::io::{BufRead as _, BufReader, IsTerminal as _, Write as _};
-use std::os::unix::net::UnixStream;
-use std::path::Path;
+use std::io::{IsTerminal as _, Write as _};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use super::gateway_client::GatewayClient;
 use super::{CliError, StatusArguments, has_colours, print, signal, written_to_end};
 use crate::local::overview::{Axis, FORMAT, Overview};
 
@@ -25,17 +24,17 @@ const CLEAR: &str = "\x1b[H\x1b[2J";
 
 /// Shows the state once, or again and again. The exit status is 0 when all is well.
 pub fn run(arguments: &StatusArguments) -> Result<ExitCode, CliError> {
-    let mut client = Client::connect(&arguments.local)?;
+    let mut client = GatewayClient::connect(&arguments.local, PATIENCE)?;
     let terminal = std::io::stdout().is_terminal();
     let colours = has_colours(&std::io::stdout());
     if !arguments.watch {
-        let (json, overview) = client.ask()?;
+        let (json, overview) = ask(&mut client)?;
         let text = if arguments.json { format!("{json}\n") } else { text(&overview, colours) };
         return print(text, exit(&overview));
     }
     let stop = signal::stop_on_signals()?;
     loop {
-        let (json, overview) = client.ask()?;
+        let (json, overview) = ask(&mut client)?;
         let mut out = std::io::stdout().lock();
         let shown = match (arguments.json, terminal) {
             (true, _) => format!("{json}\n"),
@@ -59,43 +58,16 @@ fn exit(overview: &Overview) -> ExitCode {
     if overview.is_healthy() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// A connection to the socket.
-struct Client {
-    stream: BufReader<UnixStream>,
-}
-
-impl Client {
-    fn connect(path: &Path) -> Result<Self, CliError> {
-        let shown = path.display();
-        let stream = UnixStream::connect(path).map_err(|error| {
-            format!("no gateway answers at {shown}: {error}\nstart it with `axisbridge run --config FILE --local {shown}`")
-        })?;
-        stream.set_read_timeout(Some(PATIENCE))?;
-        stream.set_write_timeout(Some(PATIENCE))?;
-        Ok(Self { stream: BufReader::new(stream) })
+/// The overview, as it came and as it is.
+fn ask(client: &mut GatewayClient) -> Result<(String, Overview), CliError> {
+    let reply = client.ask("box")?.last;
+    let other = || format!("expected a reply `ok box {{...}}` of format {FORMAT}, got `{reply}`");
+    let json = reply.strip_prefix("ok box ").ok_or_else(other)?;
+    let overview: Overview = serde_json::from_str(json).map_err(|error| format!("{}: {error}", other()))?;
+    if overview.format != FORMAT {
+        return Err(other().into());
     }
-
-    /// The overview, as it came and as it is.
-    fn ask(&mut self) -> Result<(String, Overview), CliError> {
-        self.stream.get_mut().write_all(b"box\n").map_err(|error| format!("the gateway is gone: {error}"))?;
-        let mut reply = String::new();
-        let read = self
-            .stream
-            .read_line(&mut reply)
-            .map_err(|error| format!("the gateway does not answer: {error}"))?;
-        if read == 0 {
-            return Err("the gateway has closed the connection: at most four clients are let in".into());
-        }
-        let other =
-            || format!("expected a reply `ok box {{...}}` of format {FORMAT}, got `{}`", reply.trim_end());
-        let json = reply.trim_end().strip_prefix("ok box ").ok_or_else(other)?;
-        let overview: Overview =
-            serde_json::from_str(json).map_err(|error| format!("{}: {error}", other()))?;
-        if overview.format != FORMAT {
-            return Err(other().into());
-        }
-        Ok((json.to_owned(), overview))
-    }
+    Ok((json.to_owned(), overview))
 }
 
 /// The overview for a person.

@@ -12,6 +12,8 @@ use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 
+use super::known_object::KnownObject;
+
 /// A CAN bus with CANopen drives.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Can {
@@ -80,6 +82,8 @@ pub struct DeviceFile {
     pub stamp: Stamp,
     /// The PDOs that it has then, where the file reports them.
     pub pdos: Option<[Vec<Pdo>; 2]>,
+    /// The objects that the file describes; a concise one describes none.
+    pub objects: Vec<KnownObject>,
 }
 
 /// How a CAN bus, or a DeviceNet network, is reached.

@@ -14,6 +14,7 @@ use profile_cia402::sdo::request::SdoData;
 use profile_cia402::wire::{Mux, NodeId};
 
 use super::file::CanDeviceTable;
+use super::known_object::KnownObject;
 use super::{CanDevice, DeviceFile, Written};
 use crate::finding::registry as code;
 use crate::finding::{Code, Findings, Problem, Source, read_bytes};
@@ -56,8 +57,8 @@ pub(super) fn load(folder: &Path, written: &mut Written, findings: &mut Findings
     good
 }
 
-/// What is written, and the PDOs that the device has then, where the file reports them.
-type Values = (Vec<Write>, Option<[Vec<Pdo>; 2]>);
+/// What is written, the PDOs that the device has then, where the file reports them, and its objects.
+type Values = (Vec<Write>, Option<[Vec<Pdo>; 2]>, Vec<KnownObject>);
 
 /// Reads one file.
 struct Loader<'l> {
@@ -80,8 +81,8 @@ impl Loader<'_> {
             }
         };
         // Fewer than 2^24 entries are in a file that may be read, and no text has a zero.
-        let (writes, pdos) = if bytes.get(..4).is_some_and(|count| count[3] == 0) {
-            (self.concise(&bytes)?, None)
+        let (writes, pdos, objects) = if bytes.get(..4).is_some_and(|count| count[3] == 0) {
+            (self.concise(&bytes)?, None, Vec::new())
         } else {
             self.text(&bytes)?
         };
@@ -91,7 +92,7 @@ impl Loader<'_> {
             return self
                 .report(problem.expected("expected a `ParameterValue` that the box does not set itself"));
         }
-        self.device.file = Some(DeviceFile { stamp: stamp(&writes), writes, pdos });
+        self.device.file = Some(DeviceFile { stamp: stamp(&writes), writes, pdos, objects });
         Some(())
     }
 
@@ -161,7 +162,8 @@ impl Loader<'_> {
         let writes =
             self.writes(&source, configuration.writes.iter().map(concise::Write::entry).collect())?;
         let pdos = Direction::BOTH.map(|way| description.pdos(way, node));
-        Some((writes, Some(pdos).filter(|pdos| pdos.iter().any(|pdos| !pdos.is_empty()))))
+        let pdos = Some(pdos).filter(|pdos| pdos.iter().any(|pdos| !pdos.is_empty()));
+        Some((writes, pdos, KnownObject::of_description(&description)))
     }
 
     /// What is written of these; the rest is told.
@@ -227,6 +229,12 @@ impl Loader<'_> {
         }
         Some(())
     }
+}
+
+/// Whether the box sets an object itself where it maps the PDOs, or whether writing it would undo what the box needs.
+#[must_use]
+pub fn is_set_by_gateway(index: u16) -> bool {
+    is_own(index, false)
 }
 
 /// Whether the box sets an object itself, or whether writing it would undo what the box needs.

@@ -14,6 +14,7 @@ pub(crate) mod duration;
 mod elsewhere;
 pub mod file;
 pub(crate) mod form;
+mod known_object;
 mod named;
 mod rated;
 mod sercos;
@@ -27,7 +28,9 @@ pub use self::axis::{Axis, AxisFunction, AxisKind, DriveAt, Limits, StoppingActi
 pub use self::can::{Can, CanDevice, CanDrive, CanLink, DeviceFile, Lss};
 pub(crate) use self::check::{DEFAULT_ALLOWED_LOSSES, DEFAULT_JITTER, DEFAULT_PRIORITY};
 pub use self::device::{Device, Identity};
+pub use self::device_file::is_set_by_gateway;
 pub use self::devicenet::{Devicenet, DevicenetDrive, DevicenetKind};
+pub use self::known_object::KnownObject;
 pub use self::sercos::{Drive, Link, Sercos};
 
 use crate::finding::{Findings, Problem, Source, partial, read_file, registry as code, tree};

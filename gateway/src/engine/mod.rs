@@ -25,6 +25,7 @@ mod changes;
 mod clock;
 pub mod cyclic;
 pub mod device;
+pub mod direct;
 mod ending;
 pub mod local;
 pub mod north;
@@ -49,6 +50,7 @@ use self::bus::{Answer, Buses, Purpose, South};
 use self::changes::Changes;
 use self::clock::Clock;
 use self::device::DeviceChannel;
+use self::direct::DirectNorth;
 use self::ending::Ending;
 use self::local::LocalNorth;
 use self::north::{Exchange, North};
@@ -76,6 +78,8 @@ pub struct Engine {
     local: Option<LocalNorth>,
     /// Registers that are parameters of drives, if there are some.
     registers: Option<RegisterNorth>,
+    /// Direct accesses to drives, if the gateway offers them.
+    direct: Option<DirectNorth>,
     axes: Vec<AxisChannel>,
     notices: rtrb::Producer<Notice>,
     schedule: Schedule,
@@ -123,6 +127,7 @@ impl Engine {
             devices,
             local: None,
             registers: None,
+            direct: None,
             axes,
             notices,
         }
@@ -136,6 +141,11 @@ impl Engine {
     /// Adds registers that are parameters of drives; to be called before the first cycle.
     pub fn set_registers(&mut self, registers: RegisterNorth) {
         self.registers = Some(registers);
+    }
+
+    /// Adds direct accesses to drives; to be called before the first cycle.
+    pub fn set_direct(&mut self, direct: DirectNorth) {
+        self.direct = Some(direct);
     }
 
     /// The mapping tables.
@@ -321,7 +331,8 @@ impl Engine {
 
     /// Takes what came from controllers, and lets controllers and axes exchange their values.
     fn serve_norths(&mut self, now: MonotonicTime, north: &mut [&mut dyn NorthPort]) {
-        let Self { devices, local, registers, mapping, axes, buses, notices, clock, ending, .. } = self;
+        let Self { devices, local, registers, direct, mapping, axes, buses, notices, clock, ending, .. } =
+            self;
         let time = &clock.base;
         for (channel, port) in devices.iter_mut().zip(north.iter_mut()) {
             channel.receive(now, time, &mut **port);
@@ -335,6 +346,9 @@ impl Engine {
         }
         if let Some(registers) = registers {
             registers.exchange(mapping, (exchange.axes, exchange.ending), buses);
+        }
+        if let Some(direct) = direct {
+            direct.exchange(&mut exchange, buses);
         }
         for channel in devices {
             channel.exchange(&mut exchange);

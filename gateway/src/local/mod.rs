@@ -1,5 +1,6 @@
 //! Local control over a Unix socket: the text protocol and its server. What the orders do is in [`crate::engine::local`].
 
+pub mod drive;
 pub mod overview;
 pub mod protocol;
 mod server;

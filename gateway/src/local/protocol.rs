@@ -6,8 +6,8 @@
 //!           error WORD AXIS CODE: TEXT
 //! ```
 //!
-//! Values are decimal numbers in the units of the axis: revolutions or millimetres, and seconds. Those of parameters are whole
-//! numbers in the unit of the parameter.
+//! Values are decimal numbers in the units of the axis: revolutions or millimetres, and seconds. Those of parameters with a name
+//! are whole numbers in the unit of the parameter; those with the number of a drive are in [`super::drive`].
 
 use std::fmt::Write as _;
 
@@ -15,18 +15,20 @@ use profile_generic::parameter::{Access, Parameter};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 
+use super::drive::id::Id;
+use super::drive::job::Ask;
 use crate::config::AxisKind;
 use crate::engine::local::{Failure, Generator, Jog, Move, Order};
 use crate::mapping::Mapping;
 use crate::status::AxisStatus;
 
-/// Longest request; what is longer is refused and skipped.
-pub const LINE_MAX: usize = 256;
+/// Longest request, bytes; what is longer is refused and skipped. A value of 2000 bytes fits, written as `hex:`.
+pub const LINE_MAX: usize = 4_096;
 
 /// Nanounits in a unit.
 const NANO: i64 = 1_000_000_000;
 
-/// A parameter of a vendor that clients can read and write.
+/// A parameter that clients can read and write by its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedParameter {
     /// Its name in the tables.
@@ -42,12 +44,11 @@ pub struct NamedParameter {
 }
 
 impl NamedParameter {
-    /// Those that the overlays of a gateway define, in the order of their numbers.
+    /// Those of the generic model and those that the overlays of a gateway define, in the order of their numbers.
     #[must_use]
     pub fn of(mapping: &Mapping) -> Vec<Self> {
         let rows = mapping.dictionaries.generic.parameters().iter();
         let mut parameters: Vec<Self> = rows
-            .filter(|row| row.parameter.is_of_vendor())
             .map(|row| Self {
                 name: row.name.clone(),
                 parameter: row.parameter,
@@ -62,7 +63,7 @@ impl NamedParameter {
 }
 
 /// A request of a client.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
     /// Show the whole gateway.
     Box,
@@ -78,6 +79,13 @@ pub enum Request {
         parameter: usize,
         /// What is written; `None` reads.
         wanted: Option<i64>,
+    },
+    /// Read, write or list parameters of a drive by its numbers.
+    Drive {
+        /// Position of the axis in the configuration, from 0.
+        axis: usize,
+        /// What is asked for.
+        ask: Ask,
     },
     /// Show the state of an axis.
     Status {
@@ -98,7 +106,7 @@ pub enum Request {
 pub enum BadRequest {
     /// The first word is none of the protocol's.
     #[error(
-        "unknown word `{0}`: expected box, axes, status, enable, disable, stop, reset, jog, move, home, parameters, read or write"
+        "unknown word `{0}`: expected box, axes, status, enable, disable, stop, reset, jog, move, home, parameters, list, read or write"
     )]
     Word(String),
     /// The word needs an axis.
@@ -113,7 +121,9 @@ pub enum BadRequest {
         known: String,
     },
     /// There is no parameter of this name.
-    #[error("unknown parameter `{name}`: `parameters` lists those of the overlays")]
+    #[error(
+        "unknown parameter `{name}`: expected a name that `list` shows, or a number such as S-0-0100, 6081h or 1.1.7"
+    )]
     Parameter {
         /// The name in the request.
         name: String,
@@ -183,7 +193,15 @@ pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Resu
         "axes" => Request::Axes,
         "parameters" => Request::Parameters,
         "read" => access("read", &mut words, axes, parameters)?,
-        "write" => access("write", &mut words, axes, parameters)?,
+        "write" => match direct_write(line, axes)? {
+            Some(request) => return Ok(request),
+            None => access("write", &mut words, axes, parameters)?,
+        },
+        "list" => {
+            let axis = axis("list", &mut words, axes)?;
+            let backup = option(&mut words, "backup")?;
+            Request::Drive { axis, ask: Ask::List { backup } }
+        }
         "status" => Request::Status { axis: axis("status", &mut words, axes)? },
         _ => {
             let word = ["enable", "disable", "stop", "reset", "jog", "move", "home"]
@@ -208,6 +226,12 @@ fn access<'a>(
 ) -> Result<Request, BadRequest> {
     let axis = axis(word, words, axes)?;
     let name = words.next().ok_or(BadRequest::Missing { word, what: "the name of a parameter" })?;
+    if word == "read"
+        && let Some(id) = id(name)?
+    {
+        let brief = option(words, "brief")?;
+        return Ok(Request::Drive { axis, ask: Ask::Read { id, brief } });
+    }
     let parameter = parameters.iter().position(|known| known.name == name);
     let parameter = parameter.ok_or_else(|| BadRequest::Parameter { name: name.to_owned() })?;
     if word == "read" {
@@ -216,6 +240,45 @@ fn access<'a>(
     let text = words.next().ok_or(BadRequest::Missing { word, what: "a value" })?;
     let wanted = text.parse().map_err(|_| BadRequest::Whole(text.to_owned()))?;
     Ok(Request::Parameter { axis, parameter, wanted: Some(wanted) })
+}
+
+/// The number of a parameter in its drive; `None` for what is a name.
+fn id(word: &str) -> Result<Option<Id>, BadRequest> {
+    match Id::parse(word) {
+        None if Id::is_meant(word) => Err(BadRequest::Parameter { name: word.to_owned() }),
+        id => Ok(id),
+    }
+}
+
+/// Whether the line goes on with this word.
+fn option<'a>(words: &mut impl Iterator<Item = &'a str>, known: &'static str) -> Result<bool, BadRequest> {
+    match words.next() {
+        None => Ok(false),
+        Some(word) if word == known => Ok(true),
+        Some(text) => Err(BadRequest::Unexpected { text: text.to_owned(), expected: known }),
+    }
+}
+
+/// A write to a parameter by its number: the value is the rest of the line. `None` for a name.
+fn direct_write(line: &str, axes: &[String]) -> Result<Option<Request>, BadRequest> {
+    let mut rest = line;
+    let [_, name, number] = [(); 3].map(|()| take_word(&mut rest));
+    let Some(id) = id(number)? else { return Ok(None) };
+    let axis = axis("write", &mut std::iter::once(name), axes)?;
+    let text = rest.trim_ascii();
+    if text.is_empty() {
+        return Err(BadRequest::Missing { word: "write", what: "a value" });
+    }
+    Ok(Some(Request::Drive { axis, ask: Ask::Write { id, text: text.to_owned() } }))
+}
+
+/// The next word of a line, which is left with what follows.
+fn take_word<'l>(line: &mut &'l str) -> &'l str {
+    let start = line.trim_ascii_start();
+    let end = start.find(|letter: char| letter.is_ascii_whitespace()).unwrap_or(start.len());
+    let (word, rest) = start.split_at(end);
+    *line = rest;
+    word
 }
 
 fn axis<'a>(
@@ -368,11 +431,21 @@ pub fn list(names: &[String], state: impl Fn(usize) -> String) -> String {
     text
 }
 
-/// The reply to `parameters`: a line for each, and one that ends the list.
+/// The reply to `parameters`: a line for each of the overlays, and one that ends the list.
 #[must_use]
 pub fn parameter_list(parameters: &[NamedParameter]) -> String {
+    let mut text = parameter_lines(parameters);
+    let count = text.lines().count();
+    let _ = writeln!(text, "ok parameters {count}");
+    text
+}
+
+/// A line for each parameter of the overlays.
+#[must_use]
+pub fn parameter_lines(parameters: &[NamedParameter]) -> String {
     let mut text = String::new();
-    for NamedParameter { name, unit, access, range, .. } in parameters {
+    let of_overlays = parameters.iter().filter(|row| row.parameter.is_of_vendor());
+    for NamedParameter { name, unit, access, range, .. } in of_overlays {
         let _ = write!(text, "parameter {name} access={access}");
         if !unit.is_empty() {
             let _ = write!(text, " unit={unit}");
@@ -382,7 +455,6 @@ pub fn parameter_list(parameters: &[NamedParameter]) -> String {
         }
         text.push('\n');
     }
-    let _ = writeln!(text, "ok parameters {}", parameters.len());
     text
 }
 
@@ -498,6 +570,38 @@ mod tests {
             assert_eq!(parse(line, &axes), Ok(Request::Order { axis: 0, order: expected }), "{line}");
         }
         assert_eq!(order("jog x 1"), order("jog x +1.0"));
+    }
+
+    #[test]
+    fn parameters_of_a_drive_are_named_by_its_numbers() {
+        let drive = |axis, ask| Ok(Request::Drive { axis, ask });
+        let id = |text| Id::parse(text).expect(text);
+        let write = |text, value: &str| Ask::Write { id: id(text), text: value.to_owned() };
+        for (line, axis, ask) in [
+            ("read x S-0-0100", 0, Ask::Read { id: id("S-0-0100"), brief: false }),
+            ("read y-2 6081h brief", 1, Ask::Read { id: id("6081h"), brief: true }),
+            ("list x", 0, Ask::List { backup: false }),
+            ("list y-2 backup", 1, Ask::List { backup: true }),
+            ("write x P-0-4000 12.5", 0, write("P-0-4000", "12.5")),
+            ("  write\ty-2  0x6081.0   two  words ", 1, write("6081h", "two  words")),
+            ("write x 1.1.7 hex:0102", 0, write("1.1.7", "hex:0102")),
+        ] {
+            assert_eq!(parse(line, &axes(), &parameters()), drive(axis, ask), "{line}");
+        }
+        for (line, code) in [
+            ("read x S-0", "no-parameter"),
+            ("read x 6081", "no-parameter"),
+            ("write x 6081 5", "no-parameter"),
+            ("write z 6081h 5", "no-axis"),
+            ("write x 6081h", "syntax"),
+            ("write x 6081h  ", "syntax"),
+            ("read x 6081h all", "syntax"),
+            ("read x 6081h brief brief", "syntax"),
+            ("list x all", "syntax"),
+            ("list", "no-axis"),
+        ] {
+            assert_eq!(parse(line, &axes(), &parameters()).expect_err(line).code(), code, "{line}");
+        }
     }
 
     #[test]

@@ -19,9 +19,12 @@ use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::mpsc;
 use tracing::{info, warn};
 
+use super::drive::job::{Ask, Context, Job, Step};
+use super::drive::known::Catalogue;
 use super::overview::{Known, Overview};
 use super::protocol::{self, BadRequest, LINE_MAX, NamedParameter};
 use crate::config::{AxisKind, TimeSource};
+use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
 use crate::latest::Reader;
 use crate::status::BoxStatus;
@@ -49,8 +52,10 @@ pub struct Shared {
     pub names: Vec<String>,
     /// Rotary or linear, in the order of the axes: it decides the unit in replies.
     pub kinds: Vec<AxisKind>,
-    /// Parameters that can be read and written.
+    /// Parameters that can be read and written by name.
     pub parameters: Vec<NamedParameter>,
+    /// What is known of the drives.
+    pub catalogue: Catalogue,
     /// The status of the gateway.
     pub status: Reader<BoxStatus>,
     /// Its name in the configuration.
@@ -95,6 +100,7 @@ pub struct LocalServer {
     listener: UnixListener,
     shared: Arc<Shared>,
     end: ClientEnd,
+    direct: DirectEnd,
     uid: u32,
 }
 
@@ -102,7 +108,15 @@ pub struct LocalServer {
 #[derive(Debug)]
 enum ToHub {
     Ask(Request),
+    Access(DirectRequest),
     Gone { client: ClientId },
+}
+
+/// From the hub to a client's task.
+#[derive(Debug)]
+enum ToClient {
+    Answer(Answer),
+    Accessed(DirectAnswer),
 }
 
 impl LocalServer {
@@ -110,7 +124,11 @@ impl LocalServer {
     ///
     /// # Errors
     /// The path is in use, or cannot be created.
-    pub fn bind(path: &Path, shared: Shared, end: ClientEnd) -> io::Result<(Self, SocketFile)> {
+    pub fn bind(
+        path: &Path,
+        shared: Shared,
+        (end, direct): (ClientEnd, DirectEnd),
+    ) -> io::Result<(Self, SocketFile)> {
         if let Ok(known) = std::fs::symlink_metadata(path) {
             if !known.file_type().is_socket() {
                 return Err(io::Error::new(
@@ -127,15 +145,16 @@ impl LocalServer {
         let file = SocketFile(path.to_owned());
         std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
         let uid = rustix::process::getuid().as_raw();
-        Ok((Self { listener, shared: Arc::new(shared), end, uid }, file))
+        Ok((Self { listener, shared: Arc::new(shared), end, direct, uid }, file))
     }
 
     /// Serves clients until the future is dropped.
     pub async fn run(self) {
-        let Self { listener, shared, mut end, uid } = self;
+        let Self { listener, shared, mut end, mut direct, uid } = self;
         let (to_hub, mut from_clients) = mpsc::channel::<ToHub>(WAITING_MAX);
-        let mut clients: HashMap<ClientId, mpsc::Sender<Answer>> = HashMap::new();
+        let mut clients: HashMap<ClientId, mpsc::Sender<ToClient>> = HashMap::new();
         let mut waiting: VecDeque<Request> = VecDeque::new();
+        let mut accesses: VecDeque<DirectRequest> = VecDeque::new();
         let mut last: ClientId = 0;
         let mut interval = tokio::time::interval(HUB_INTERVAL);
         interval.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
@@ -156,13 +175,15 @@ impl LocalServer {
                         tokio::time::sleep(Duration::from_millis(100)).await;
                     }
                 },
-                Some(message) = from_clients.recv() => waiting.push_back(match message {
-                    ToHub::Ask(request) => request,
+                Some(message) = from_clients.recv() => match message {
+                    ToHub::Ask(request) => waiting.push_back(request),
+                    ToHub::Access(request) => accesses.push_back(request),
                     ToHub::Gone { client } => {
                         clients.remove(&client);
-                        Request::Gone { client }
+                        accesses.retain(|request| request.client != client);
+                        waiting.push_back(Request::Gone { client });
                     }
-                }),
+                },
                 _ = interval.tick() => {}
             }
             while let Some(request) = waiting.pop_front() {
@@ -171,15 +192,26 @@ impl LocalServer {
                     break;
                 }
             }
-            while let Ok(answer) = end.answers.pop() {
-                // The channel of a client that does not read its replies is full: it is disconnected.
-                if let Some(client) = clients.get(&answer.client)
-                    && client.try_send(answer).is_err()
-                {
-                    clients.remove(&answer.client);
+            while let Some(request) = accesses.pop_front() {
+                if let Err(rtrb::PushError::Full(request)) = direct.requests.push(request) {
+                    accesses.push_front(request);
+                    break;
                 }
             }
+            while let Ok(answer) = end.answers.pop() {
+                hand_on(&mut clients, answer.client, ToClient::Answer(answer));
+            }
+            while let Ok(answer) = direct.answers.pop() {
+                hand_on(&mut clients, answer.client, ToClient::Accessed(answer));
+            }
         }
+    }
+}
+
+/// Hands an answer to its client. The channel of one that does not read its replies is full: it is disconnected.
+fn hand_on(clients: &mut HashMap<ClientId, mpsc::Sender<ToClient>>, client: ClientId, answer: ToClient) {
+    if clients.get(&client).is_some_and(|known| known.try_send(answer).is_err()) {
+        clients.remove(&client);
     }
 }
 
@@ -216,7 +248,7 @@ struct Client {
 }
 
 impl Client {
-    async fn run(self, mut stream: UnixStream, answers: mpsc::Receiver<Answer>) {
+    async fn run(self, mut stream: UnixStream, answers: mpsc::Receiver<ToClient>) {
         info!(client = self.id, "local control: client connected");
         let ended = self.serve(&mut stream, answers).await;
         let _ = self.to_hub.send(ToHub::Gone { client: self.id }).await;
@@ -226,7 +258,7 @@ impl Client {
         }
     }
 
-    async fn serve(&self, stream: &mut UnixStream, mut answers: mpsc::Receiver<Answer>) -> io::Result<()> {
+    async fn serve(&self, stream: &mut UnixStream, mut answers: mpsc::Receiver<ToClient>) -> io::Result<()> {
         let mut lines = Lines::default();
         let mut pending: HashMap<u32, Accepted> = HashMap::new();
         let mut last = 0_u32;
@@ -242,11 +274,10 @@ impl Client {
                     for byte in &buffer[..len] {
                         let Some(line) = lines.push(*byte) else { continue };
                         last = last.wrapping_add(1);
-                        match self.request(&line, pending.len()) {
-                            Ok(accepted) => {
-                                let request = self.asked(last, &accepted);
+                        match self.request(last, &line, pending.len()) {
+                            Ok((accepted, request)) => {
                                 pending.insert(last, accepted);
-                                if self.to_hub.send(ToHub::Ask(request)).await.is_err() {
+                                if self.to_hub.send(request).await.is_err() {
                                     return Ok(());
                                 }
                             }
@@ -259,9 +290,19 @@ impl Client {
                     let Some(answer) = answer else {
                         return Err(unread());
                     };
-                    match pending.remove(&answer.id) {
-                        Some(accepted) => self.reply(&accepted, &answer),
-                        None => String::new(),
+                    let next = match answer {
+                        ToClient::Answer(answer) => {
+                            let accepted = pending.remove(&answer.id);
+                            Err(accepted.map(|accepted| self.reply(&accepted, &answer)).unwrap_or_default())
+                        }
+                        ToClient::Accessed(answer) => self.accessed(answer, &mut pending),
+                    };
+                    match next {
+                        Err(reply) => reply,
+                        Ok(request) => match self.to_hub.send(ToHub::Access(request)).await {
+                            Ok(()) => continue,
+                            Err(_) => return Ok(()),
+                        },
                     }
                 }
             };
@@ -270,38 +311,88 @@ impl Client {
         }
     }
 
-    /// What a line asks the engine for, or the reply to it.
-    fn request(&self, line: &Result<String, BadRequest>, pending: usize) -> Result<Accepted, String> {
+    /// What a line asks the engine for, under the number `id`; or the reply to it.
+    fn request(
+        &self,
+        id: u32,
+        line: &Result<String, BadRequest>,
+        pending: usize,
+    ) -> Result<(Accepted, ToHub), String> {
         let line = line.as_ref().map_err(|error| protocol::bad("-", error))?;
         let Shared { names, parameters, .. } = &*self.shared;
-        match protocol::parse(line, names, parameters).map_err(|error| protocol::bad(line, &error))? {
+        let request =
+            protocol::parse(line, names, parameters).map_err(|error| protocol::bad(line, &error))?;
+        let number = |axis: usize| u8::try_from(axis).unwrap_or(u8::MAX);
+        let client = self.id;
+        match request {
             protocol::Request::Box => Err(self.shared.overview()),
             protocol::Request::Axes => Err(protocol::list(names, |axis| self.shared.state(axis))),
             protocol::Request::Status { axis } => {
                 Err(protocol::done("status", &names[axis], &self.shared.state(axis)))
             }
             protocol::Request::Parameters => Err(protocol::parameter_list(parameters)),
-            protocol::Request::Order { .. } | protocol::Request::Parameter { .. }
-                if pending >= PENDING_MAX =>
-            {
-                Err(protocol::bad(line, &BadRequest::TooMany))
+            _ if pending >= PENDING_MAX => Err(protocol::bad(line, &BadRequest::TooMany)),
+            protocol::Request::Order { axis, order } => {
+                let request = Request::Order { client, id, axis: number(axis), order };
+                Ok((Accepted { axis, what: What::Order(order) }, ToHub::Ask(request)))
             }
-            protocol::Request::Order { axis, order } => Ok(Accepted { axis, what: What::Order(order) }),
             protocol::Request::Parameter { axis, parameter, wanted } => {
-                Ok(Accepted { axis, what: What::Parameter(parameters[parameter].clone(), wanted) })
+                let named = parameters[parameter].clone();
+                let parameter = named.parameter;
+                let request = Request::Parameter { client, id, axis: number(axis), parameter, wanted };
+                Ok((Accepted { axis, what: What::Parameter(named, wanted) }, ToHub::Ask(request)))
             }
+            protocol::Request::Drive { axis, ask } => self.begin(id, axis, ask),
         }
     }
 
-    /// What the engine is asked.
-    fn asked(&self, id: u32, Accepted { axis, what }: &Accepted) -> Request {
-        let (client, axis) = (self.id, u8::try_from(*axis).unwrap_or(u8::MAX));
-        match what {
-            What::Order(order) => Request::Order { client, id, axis, order: *order },
-            What::Parameter(named, wanted) => {
-                Request::Parameter { client, id, axis, parameter: named.parameter, wanted: *wanted }
+    /// Begins with a request for parameters of a drive; or the reply to it.
+    fn begin(&self, id: u32, axis: usize, ask: Ask) -> Result<(Accepted, ToHub), String> {
+        let (job, step) = self.with_context(axis, |context| Job::begin(ask, context))?;
+        match step {
+            Step::Access(..) => {
+                let request = self.access(id, axis, step)?;
+                Ok((Accepted { axis, what: What::Drive(Box::new(job)) }, ToHub::Access(request)))
             }
+            Step::Reply(reply) => Err(reply),
         }
+    }
+
+    /// Goes on with a request when its drive has answered: the next access, or the reply.
+    fn accessed(
+        &self,
+        answer: DirectAnswer,
+        pending: &mut HashMap<u32, Accepted>,
+    ) -> Result<DirectRequest, String> {
+        let id = answer.id;
+        let Some(Accepted { axis, what: What::Drive(job) }) = pending.get_mut(&id) else {
+            return Err(String::new());
+        };
+        let axis = *axis;
+        let next = self.access(id, axis, self.with_context(axis, |context| job.take(answer, context)));
+        if next.is_err() {
+            pending.remove(&id);
+        }
+        next
+    }
+
+    /// What a step asks of the engine, or the reply that it is.
+    fn access(&self, id: u32, axis: usize, step: Step) -> Result<DirectRequest, String> {
+        match step {
+            Step::Access(target, direction, data) => {
+                let axis = u8::try_from(axis).unwrap_or(u8::MAX);
+                Ok(DirectRequest { client: self.id, id, axis, target, direction, data })
+            }
+            Step::Reply(reply) => Err(reply),
+        }
+    }
+
+    /// Calls with what is known of the drive of an axis.
+    fn with_context<T>(&self, axis: usize, with: impl FnOnce(&Context<'_>) -> T) -> T {
+        let Shared { names, parameters, catalogue, .. } = &*self.shared;
+        let named = protocol::parameter_lines(parameters);
+        let axis_name = names.get(axis).map_or("-", String::as_str);
+        with(&Context { axis: axis_name, bus: catalogue.bus(axis), catalogue, named: &named })
     }
 
     fn reply(&self, Accepted { axis, what }: &Accepted, answer: &Answer) -> String {
@@ -310,6 +401,8 @@ impl Client {
             What::Order(order) => order.name(),
             What::Parameter(_, None) => "read",
             What::Parameter(_, Some(_)) => "write",
+            // Its accesses are answered by themselves.
+            What::Drive(_) => return String::new(),
         };
         match (&answer.result, what) {
             (Ok(Some(value)), What::Parameter(named, _)) => protocol::accessed(word, name, named, *value),
@@ -329,10 +422,12 @@ struct Accepted {
     what: What,
 }
 
-/// What is asked of an axis.
+/// What is asked of an axis or its drive.
 enum What {
     Order(Order),
     Parameter(NamedParameter, Option<i64>),
+    /// A request for parameters by the numbers of the drive.
+    Drive(Box<Job>),
 }
 
 /// Cuts a stream of bytes into lines of bounded length.
@@ -369,12 +464,18 @@ mod tests {
     use std::os::unix::fs::MetadataExt as _;
 
     use profile_generic::parameter::{Access, Parameter};
+    use profile_sercos::wire::attribute::{Attribute, Format, ItemLength};
+    use profile_sercos::wire::idn::Idn;
+    use profile_sercos::wire::svc::Element;
     use tokio::io::{AsyncBufReadExt as _, BufReader};
 
+    use super::super::drive::known::Bus;
     use super::*;
+    use crate::engine::direct::{DirectFailure, Direction, Target};
     use crate::engine::local::Failure;
     use crate::engine::parameter::ParameterFailure;
     use crate::latest::latest;
+    use crate::mapping::Mapping;
     use crate::status::tests::distinct;
     use crate::time::ptp::FollowerConfig;
     use crate::time::status::TimeStatus;
@@ -384,9 +485,13 @@ mod tests {
         path: PathBuf,
         requests: rtrb::Consumer<Request>,
         answers: rtrb::Producer<Answer>,
+        direct: Direct,
         _file: SocketFile,
         folder: PathBuf,
     }
+
+    type Ends = (ClientEnd, DirectEnd);
+    type Direct = (rtrb::Consumer<DirectRequest>, rtrb::Producer<DirectAnswer>);
 
     fn shared() -> Shared {
         let (publisher, status) = latest(distinct());
@@ -406,6 +511,7 @@ mod tests {
             names,
             kinds,
             parameters: vec![code],
+            catalogue: Catalogue::new(vec![Bus::Sercos, Bus::Devicenet], &Mapping::embedded().unwrap()),
             status,
             name: "cell".to_owned(),
             source: TimeSource::Ptp,
@@ -413,10 +519,14 @@ mod tests {
         }
     }
 
-    fn queues() -> (ClientEnd, rtrb::Consumer<Request>, rtrb::Producer<Answer>) {
+    /// The queues of a server, and the engine's ends of those of orders and of direct accesses.
+    fn queues() -> (Ends, (rtrb::Consumer<Request>, rtrb::Producer<Answer>), Direct) {
         let (requests, taken) = rtrb::RingBuffer::new(8);
         let (given, answers) = rtrb::RingBuffer::new(8);
-        (ClientEnd { requests, answers }, taken, given)
+        let (accesses, asked) = rtrb::RingBuffer::new(8);
+        let (accessed, results) = rtrb::RingBuffer::new(8);
+        let direct = DirectEnd { requests: accesses, answers: results };
+        ((ClientEnd { requests, answers }, direct), (taken, given), (asked, accessed))
     }
 
     impl Bench {
@@ -424,14 +534,25 @@ mod tests {
             let folder = std::env::temp_dir().join(format!("axisbridge-local-{}-{name}", std::process::id()));
             std::fs::create_dir_all(&folder).unwrap();
             let path = folder.join("socket");
-            let (end, requests, answers) = queues();
-            let (server, file) = LocalServer::bind(&path, shared(), end).unwrap();
+            let (ends, (requests, answers), direct) = queues();
+            let (server, file) = LocalServer::bind(&path, shared(), ends).unwrap();
             tokio::spawn(server.run());
-            Self { path, requests, answers, _file: file, folder }
+            Self { path, requests, answers, direct, _file: file, folder }
         }
 
         async fn connect(&self) -> BufReader<UnixStream> {
             BufReader::new(UnixStream::connect(&self.path).await.unwrap())
+        }
+
+        /// The next access that reaches the engine.
+        async fn access(&mut self) -> DirectRequest {
+            for _ in 0..5_000 {
+                if let Ok(request) = self.direct.0.pop() {
+                    return request;
+                }
+                tokio::time::sleep(Duration::from_millis(1)).await;
+            }
+            panic!("no access reaches the engine");
         }
 
         /// The next request that reaches the engine.
@@ -534,12 +655,48 @@ mod tests {
         let mut client = bench.connect().await;
         let long = "x".repeat(LINE_MAX + 1);
         say(&mut client, &format!("{long}\nenable \u{1b}[2J\nwhat\naxes\n")).await;
-        assert_eq!(hear(&mut client).await, "error - - syntax: the line is longer than 256 bytes\n");
+        assert_eq!(hear(&mut client).await, "error - - syntax: the line is longer than 4096 bytes\n");
         assert_eq!(hear(&mut client).await, "error - - syntax: the line is not printable UTF-8 text\n");
         assert!(hear(&mut client).await.starts_with("error what - syntax: unknown word `what`"));
         assert!(hear(&mut client).await.starts_with("axis x state="));
         assert!(hear(&mut client).await.starts_with("axis y state="));
         assert_eq!(hear(&mut client).await, "ok axes 2\n");
+    }
+
+    #[tokio::test]
+    async fn a_parameter_of_a_drive_takes_its_accesses_one_after_the_other() {
+        let mut bench = Bench::start("drive");
+        let mut client = bench.connect().await;
+        say(&mut client, "read y S-0-0104\nread x S-0-0104 brief\n").await;
+        let other = "error read y no-parameter: S-0-0104 is a number of SERCOS drives: the drive of this axis is another one\n";
+        assert_eq!(hear(&mut client).await, other, "the engine is not asked");
+        let gain = Idn::standard(104);
+        let attribute = Attribute::new(ItemLength::Two, Format::Unsigned).with_decimals(2);
+        for (element, result, data) in
+            [(Element::Data, Ok(Some(attribute)), &[0x96, 0][..]), (Element::Name, Ok(None), b"Own name")]
+        {
+            let DirectRequest { client, id, axis, target, direction, data: mut buffer } =
+                bench.access().await;
+            assert_eq!((axis, target, direction), (0, Target::Element(gain, element), Direction::Read));
+            buffer.extend_from_slice(data);
+            bench.direct.1.push(DirectAnswer { client, id, result, data: buffer }).unwrap();
+        }
+        let expected = "ok read x {\"id\":\"S-0-0104\",\"name\":\"Own name\",\"type\":\"2 byte unsigned, 2 decimals\",\
+                        \"attribute\":\"0x02110001\",\"value\":\"1.50\",\"data\":\"9600\"}\n";
+        assert_eq!(hear(&mut client).await, expected);
+        // The answer to a client that is gone is for nobody, and the next client is served.
+        say(&mut client, "read x S-0-0104\n").await;
+        let DirectRequest { client: gone, id, data, .. } = bench.access().await;
+        drop(client);
+        bench
+            .direct
+            .1
+            .push(DirectAnswer { client: gone, id, result: Err(DirectFailure::Unanswered), data })
+            .unwrap();
+        let mut client = bench.connect().await;
+        say(&mut client, "list y\n").await;
+        assert_eq!(hear(&mut client).await, "parameter code access=write unit=mHz\n");
+        assert_eq!(hear(&mut client).await, "ok list y 1 bus=devicenet source=overlays\n");
     }
 
     #[tokio::test]

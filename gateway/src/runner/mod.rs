@@ -39,12 +39,14 @@ use crate::config::{AxisKind, CanLink, Config, Link, ModbusParameter};
 use crate::engine::Engine;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
+use crate::engine::direct::DirectNorth;
 use crate::engine::local::LocalNorth;
 use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::CanPort;
 use crate::engine::registers::RegisterNorth;
 use crate::host::HostPort;
 use crate::latest::Reader;
+use crate::local::drive::known::Catalogue;
 use crate::local::protocol::NamedParameter;
 use crate::local::{LocalServer, Shared, SocketFile};
 use crate::mapping::Mapping;
@@ -381,14 +383,17 @@ fn serve_local(
         names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
         kinds: config.axes.iter().map(|axis| axis.kind).collect(),
         parameters: NamedParameter::of(engine.mapping()),
+        catalogue: Catalogue::of(config, engine.mapping()),
         status: status.clone(),
         name: config.name.clone(),
         source: config.time.source,
         time,
     };
-    let (server, file) = LocalServer::bind(path, shared, end)
+    let (direct, accesses) = DirectNorth::new();
+    let (server, file) = LocalServer::bind(path, shared, (end, accesses))
         .map_err(|source| StartError::Local { path: path.display().to_string(), source })?;
     engine.set_local(local);
+    engine.set_direct(direct);
     info!(socket = %path.display(), "local control");
     runtime.spawn(server.run());
     Ok(file)

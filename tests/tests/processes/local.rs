@@ -11,25 +11,31 @@ use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::{Running, axisbridge};
 
 /// A running gateway and the paths of its socket and its log.
-struct Gateway {
-    run: Running,
-    socket: PathBuf,
+pub struct Gateway {
+    pub run: Running,
+    pub socket: PathBuf,
     log: PathBuf,
 }
 
-fn path(name: &str) -> PathBuf {
+/// A file of the tests.
+pub fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
 
 impl Gateway {
-    fn start(name: &str, device: &str) -> Self {
+    /// Starts it with two simulated SERCOS drives in its process.
+    pub fn start(name: &str, device: &str) -> Self {
         let example = include_str!("../../../examples/two-axes-in-process.toml");
         let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
         let mut text = example.replace("127.0.0.2", device);
         text.replace_range(modbus, "");
         let modes = "address = 1\nmodes = [\"position\", \"positioning\", \"homing\"]";
         assert_eq!(text.matches("address = 1\n").count(), 1, "{text}");
-        let text = text.replacen("address = 1", modes, 1);
+        Self::with(name, &text.replacen("address = 1", modes, 1))
+    }
+
+    /// Starts it with this configuration.
+    pub fn with(name: &str, text: &str) -> Self {
         let config = path(&format!("{name}.toml"));
         fs::write(&config, text).expect("the folder of the tests can be written to");
         let (socket, log) = (path(&format!("{name}.socket")), path(&format!("{name}.log")));
@@ -39,7 +45,7 @@ impl Gateway {
         Self { run: Running::start("run", &mut run), socket, log }
     }
 
-    fn log(&self) -> String {
+    pub fn log(&self) -> String {
         fs::read_to_string(&self.log).unwrap_or_default()
     }
 
@@ -78,7 +84,7 @@ impl Gateway {
         assert!(errors.starts_with("no gateway answers at "), "{errors}");
     }
 
-    fn connect(&self) -> Client {
+    pub fn connect(&self) -> Client {
         let end = Instant::now() + Duration::from_secs(30);
         loop {
             if let Ok(stream) = UnixStream::connect(&self.socket) {
@@ -91,7 +97,8 @@ impl Gateway {
     }
 }
 
-struct Client(BufReader<UnixStream>);
+/// A client of local control.
+pub struct Client(BufReader<UnixStream>);
 
 impl Client {
     fn say(&mut self, line: &str) {
@@ -105,13 +112,13 @@ impl Client {
     }
 
     /// Sends a request and returns its reply.
-    fn ask(&mut self, line: &str) -> String {
+    pub fn ask(&mut self, line: &str) -> String {
         self.say(line);
         self.hear()
     }
 
     /// Repeats a request until its reply begins so.
-    fn until(&mut self, line: &str, beginning: &str) -> String {
+    pub fn until(&mut self, line: &str, beginning: &str) -> String {
         let end = Instant::now() + Duration::from_secs(30);
         loop {
             let reply = self.ask(line);
@@ -125,7 +132,7 @@ impl Client {
 }
 
 /// The value of a name in a reply.
-fn value(reply: &str, name: &str) -> f64 {
+pub fn value(reply: &str, name: &str) -> f64 {
     let word = reply.split(' ').find_map(|word| word.strip_prefix(name)).unwrap_or_default();
     word.trim_end().parse().unwrap_or_else(|_| panic!("no {name} in {reply}"))
 }

@@ -4,6 +4,7 @@ mod demo;
 mod doctor;
 mod ending;
 mod local;
+mod param;
 mod reload;
 mod scripts;
 mod two_clocks;

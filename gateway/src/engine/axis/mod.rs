@@ -175,6 +175,8 @@ pub struct AxisChannel {
     hookup: HookupUnit,
     captures: CaptureUnit,
     procedure: ProcedureUnit,
+    /// Values of the drive mean something else than its program was made of.
+    rescaled: bool,
 }
 
 /// The generic state machine.
@@ -208,6 +210,7 @@ impl AxisChannel {
             hookup: HookupUnit::default(),
             captures: CaptureUnit::default(),
             procedure: ProcedureUnit::default(),
+            rescaled: false,
         }
     }
 
@@ -422,6 +425,7 @@ impl AxisChannel {
         self.link.connect(program);
         self.captures.restart();
         self.drive.action = Action::TorqueOff;
+        self.rescaled = false;
     }
 
     /// Whether the drive's own fault reset is to be executed, until [`Self::drive_reset_sent`].

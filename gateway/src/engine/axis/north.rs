@@ -76,7 +76,8 @@ impl AxisChannel {
     }
 
     /// Sets the start inhibits for which the north side is the reason.
-    pub fn set_inhibits(&mut self, now: MonotonicTime, system: SystemTime, inhibits: Inhibits) {
+    pub fn set_inhibits(&mut self, now: MonotonicTime, system: SystemTime, mut inhibits: Inhibits) {
+        inhibits.set(Inhibits::TRANSFER_ACTIVE, self.rescaled);
         if let Some(transition) = self.drive.machine.set_inhibits(inhibits) {
             self.follow(now, system, transition);
         }
@@ -85,6 +86,13 @@ impl AxisChannel {
     /// Sets how the north side sends its set-points.
     pub fn keep_updates(&mut self, updates: Updates) {
         self.set_points.keep_updates(updates, &self.feedback);
+    }
+
+    /// A parameter was written that decides what the values of the drive mean: the axis cannot be enabled before its drive was
+    /// commissioned again. Only without torque.
+    pub fn rescale(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.rescaled = true;
+        self.set_inhibits(now, system, self.drive.machine.conditions().inhibits);
     }
 
     /// Raises a fault: the controller's configuration of this axis cannot be used.

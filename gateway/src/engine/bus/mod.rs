@@ -7,6 +7,7 @@ pub mod can;
 mod can_link;
 pub mod commissioner;
 pub mod devicenet;
+mod direct_slot;
 pub mod sercos;
 mod transmit_queue;
 
@@ -20,6 +21,7 @@ use super::axis::AxisChannel;
 use super::axis::capture::CaptureAccess;
 use super::axis::procedure::ProcedureAccess;
 use super::cyclic::Received;
+use super::direct::{DirectFailure, DirectResult, Target};
 use super::notice::Notice;
 use super::port::SouthPort;
 use crate::mapping::{Item, Mapping};
@@ -153,6 +155,26 @@ pub trait South {
 
     /// Starts an access to the drive of an axis. Returns `false` if there is no drive or too many accesses wait.
     fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool;
+
+    /// Starts a direct access to the drive of an axis, one of the bus at a time. `data` is written, or the place for what is read.
+    ///
+    /// # Errors
+    /// Why not, and the buffer.
+    fn begin_direct(
+        &mut self,
+        axis: usize,
+        target: Target,
+        write: bool,
+        data: Vec<u8>,
+    ) -> Result<(), (DirectFailure, Vec<u8>)>;
+
+    /// Takes the result of the direct access, once there is one.
+    fn take_direct(&mut self) -> Option<DirectResult>;
+
+    /// Whether two axes of this bus have one device.
+    fn share_device(&self, axis: usize, other: usize) -> bool {
+        axis == other
+    }
 
     /// Sends the frames that are due.
     fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent;
@@ -317,6 +339,39 @@ impl Buses {
     pub fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool {
         let place = self.of[axis];
         self.get_mut(place).access(axis, access, purpose)
+    }
+
+    /// Starts a direct access to the drive of an axis.
+    ///
+    /// # Errors
+    /// Why not, and the buffer.
+    pub fn begin_direct(
+        &mut self,
+        axis: usize,
+        target: Target,
+        write: bool,
+        data: Vec<u8>,
+    ) -> Result<(), (DirectFailure, Vec<u8>)> {
+        let place = self.of.get(axis).copied();
+        match place.and_then(|place| self.list.get_mut(place)) {
+            Some(bus) => bus.get_mut().begin_direct(axis, target, write, data),
+            None => Err((DirectFailure::NoAxis, data)),
+        }
+    }
+
+    /// Takes the result of the direct access to the drive of an axis, once there is one.
+    pub fn take_direct(&mut self, axis: usize) -> Option<DirectResult> {
+        let place = self.of.get(axis).copied()?;
+        self.list.get_mut(place)?.get_mut().take_direct()
+    }
+
+    /// Whether two axes have one device.
+    #[must_use]
+    pub fn share_device(&self, axis: usize, other: usize) -> bool {
+        match (self.of.get(axis), self.of.get(other)) {
+            (Some(place), Some(bus)) if place == bus => self.get(*place).share_device(axis, other),
+            _ => false,
+        }
     }
 }
 

@@ -33,10 +33,12 @@ use super::accesses::Accesses;
 use super::backoff::Backoff;
 use super::can_link::{CanLink, PATIENCE, Station};
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
+use super::direct_slot::DirectSlot;
 use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
+use crate::engine::direct::{DirectFailure, DirectResult, Target};
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::{DriveIdentity, Item, Mapping};
@@ -116,6 +118,7 @@ pub struct CanBus {
     /// The device of each axis, and the drive there.
     places: Places<(usize, usize)>,
     commissioner: CommissionerHandle<DeviceWork>,
+    direct: DirectSlot<Ticket>,
     cycles_seen: u64,
     link: CanLink,
     /// It was up since the bus was on last.
@@ -167,6 +170,7 @@ impl CanBus {
             places: Places::new(places),
             devices,
             commissioner,
+            direct: DirectSlot::new(),
             cycles_seen: 0,
             link: CanLink::new(cycle_time),
             up: false,
@@ -411,6 +415,10 @@ impl CanBus {
         axes: &mut [AxisChannel],
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
     ) {
+        if self.direct.contains(ticket) {
+            let result = outcome.result.map(|()| None).map_err(DirectFailure::Sdo);
+            return self.direct.end(DirectResult { result, data: buffer(outcome.data) });
+        }
         for (place, device) in self.devices.iter_mut().enumerate() {
             let run = device.run(place);
             if let Stage::Commissioning { tickets } = &mut device.stage
@@ -606,6 +614,42 @@ impl South for CanBus {
         drive.accesses.submit(access.item, purpose, || master.sdo_submit(node, request, priority).ok())
     }
 
+    fn begin_direct(
+        &mut self,
+        axis: usize,
+        target: Target,
+        write: bool,
+        data: Vec<u8>,
+    ) -> Result<(), (DirectFailure, Vec<u8>)> {
+        let Target::Object(object) = target else { return Err((DirectFailure::OtherBus, data)) };
+        let place = self.places.of(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
+        let Some((device, _)) = place else { return Err((DirectFailure::NoDrive, data)) };
+        if !self.direct.is_free() {
+            return Err((DirectFailure::Unsent, data));
+        }
+        let mux = Mux::new(object.index, object.sub);
+        let request = match write {
+            true => SdoRequest::download(mux, SdoData::Buffer(data)),
+            false => SdoRequest::upload_into(mux, data),
+        };
+        match self.master.sdo_submit(self.devices[device].node, request, Priority::Normal) {
+            Ok(ticket) => {
+                self.direct.begin(ticket);
+                Ok(())
+            }
+            Err((_, request)) => Err((DirectFailure::Unsent, buffer(request.data))),
+        }
+    }
+
+    fn take_direct(&mut self) -> Option<DirectResult> {
+        self.direct.take()
+    }
+
+    fn share_device(&self, axis: usize, other: usize) -> bool {
+        let device = |axis| self.places.of(axis).map(|(device, _)| device);
+        device(axis).is_some() && device(axis) == device(other)
+    }
+
     fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent {
         let mut sent = Sent::default();
         let SouthPort::Can(port) = port else { return sent };
@@ -688,6 +732,14 @@ fn request(access: &Access) -> Option<SdoRequest> {
     }
 }
 
+/// The buffer of a direct access, which is never inline.
+fn buffer(data: SdoData) -> Vec<u8> {
+    match data {
+        SdoData::Buffer(buffer) => buffer,
+        SdoData::Inline(_) => Vec::new(),
+    }
+}
+
 /// What a request came to.
 fn reply(outcome: &SdoOutcome) -> Result<(Data, Progress), AccessFailure> {
     outcome.result.map_err(failure)?;
@@ -696,7 +748,7 @@ fn reply(outcome: &SdoOutcome) -> Result<(Data, Progress), AccessFailure> {
 }
 
 /// What a failure of SDO is to those who do not know it.
-fn failure(failure: SdoFailure) -> AccessFailure {
+pub(in crate::engine) fn failure(failure: SdoFailure) -> AccessFailure {
     let SdoFailure::Refused(code) = failure else { return AccessFailure::Unanswered };
     AccessFailure::Refused(match code {
         code if code.is_absent() => Refusal::Unknown,

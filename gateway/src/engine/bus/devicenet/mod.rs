@@ -7,6 +7,7 @@
 //! Everything that a drive can need is made before the start: nothing here allocates, so there is no commissioner.
 
 pub mod access;
+pub mod direct;
 pub mod end;
 pub mod setup;
 
@@ -19,15 +20,18 @@ use profile_cip::devicenet::wire::MacId;
 use profile_generic::can::{Frame, Id};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
+use self::direct::DirectAccess;
 use self::end::{End, MessageError, Row};
 use self::setup::{SetupFailure, SetupStep};
 use super::accesses::Accesses;
 use super::backoff::Backoff;
 use super::can_link::{CanLink, PATIENCE, Station};
+use super::direct_slot::DirectSlot;
 use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
+use crate::engine::direct::{DirectFailure, DirectResult, Target};
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::devicenet::ROW_LEN;
@@ -99,6 +103,9 @@ pub struct DevicenetBus {
     cycles_seen: u64,
     /// Messages of drives that did not count.
     refused: u64,
+    direct: DirectSlot<Ticket>,
+    /// The direct access that is in progress, and its buffer.
+    direct_access: Option<(DirectAccess, Vec<u8>)>,
     link: CanLink,
     /// When the frames that wait were made.
     made_at: MonotonicTime,
@@ -139,6 +146,8 @@ impl DevicenetBus {
             drives,
             cycles_seen: 0,
             refused: 0,
+            direct: DirectSlot::new(),
+            direct_access: None,
             link: CanLink::new(cycle),
             made_at: MonotonicTime::ZERO,
             started: false,
@@ -227,6 +236,11 @@ impl DevicenetBus {
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
         notice: &mut dyn FnMut(Notice),
     ) {
+        if self.direct.contains(ticket) {
+            let (access, mut data) = self.direct_access.take().unwrap_or_default();
+            let result = access.result(outcome, &mut data).map(|()| None);
+            return self.direct.end(DirectResult { result, data });
+        }
         for drive in &mut self.drives {
             let axis = drive.plan.axis;
             if let Stage::Setup(step, Some(known)) = drive.stage
@@ -500,6 +514,33 @@ impl South for DevicenetBus {
         }
         let mac = drive.plan.mac;
         drive.accesses.submit(access.item, purpose, || master.submit(mac, request).ok())
+    }
+
+    fn begin_direct(
+        &mut self,
+        axis: usize,
+        target: Target,
+        write: bool,
+        data: Vec<u8>,
+    ) -> Result<(), (DirectFailure, Vec<u8>)> {
+        let Target::Attribute { class, instance, attribute } = target else {
+            return Err((DirectFailure::OtherBus, data));
+        };
+        let drive = self.places.of(axis).and_then(|place| self.drives.get(place));
+        let Some(drive) = drive.filter(|drive| drive.stage == Stage::Ready) else {
+            return Err((DirectFailure::NoDrive, data));
+        };
+        let access = DirectAccess { class, instance, attribute, write };
+        let request = access.request(&data).filter(|_| self.direct.is_free());
+        let ticket = request.and_then(|request| self.master.submit(drive.plan.mac, request).ok());
+        let Some(ticket) = ticket else { return Err((DirectFailure::Unsent, data)) };
+        self.direct.begin(ticket);
+        self.direct_access = Some((access, data));
+        Ok(())
+    }
+
+    fn take_direct(&mut self) -> Option<DirectResult> {
+        self.direct.take()
     }
 
     fn send(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) -> Sent {

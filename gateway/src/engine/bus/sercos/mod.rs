@@ -31,10 +31,12 @@ use self::progress::PhaseProgress;
 use self::recovery::Recovery;
 use super::accesses::Accesses;
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
+use super::direct_slot::DirectSlot;
 use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
+use crate::engine::direct::{DirectFailure, DirectResult, Target};
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
 use crate::mapping::{DriveFacts, DriveProgram, Full, Item, Mapping, SercosAxis, SercosError};
@@ -107,6 +109,7 @@ pub struct SercosBus {
     refused: ArrayVec<SlaveId, REFUSED_MAX>,
     /// Who commissions drives that come later.
     commissioner: CommissionerHandle<DriveWork>,
+    direct: DirectSlot<Ticket>,
     /// Room for a frame.
     buffer: Box<[u8; FRAME_MAX]>,
 }
@@ -151,6 +154,7 @@ impl SercosBus {
             cycles_seen: 0,
             refused: ArrayVec::new(),
             commissioner,
+            direct: DirectSlot::new(),
             buffer: Box::new([0; FRAME_MAX]),
         })
     }
@@ -548,6 +552,10 @@ impl SercosBus {
         axes: &mut [AxisChannel],
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
     ) {
+        if self.direct.contains(ticket) {
+            let result = outcome.result.map(|reply| reply.attribute).map_err(DirectFailure::Svc);
+            return self.direct.end(DirectResult { result, data: buffer(outcome.data) });
+        }
         // An access may be answered only after its drive was lost.
         let asked = |drive: &Drive| drive.accesses.contains(ticket);
         let own = |drive: &Drive| drive.slave == Some(ticket.slave);
@@ -701,6 +709,33 @@ impl South for SercosBus {
         drive.accesses.submit(access.item, purpose, || master.svc_submit(slave, request).ok())
     }
 
+    fn begin_direct(
+        &mut self,
+        axis: usize,
+        target: Target,
+        write: bool,
+        data: Vec<u8>,
+    ) -> Result<(), (DirectFailure, Vec<u8>)> {
+        let Target::Element(idn, element) = target else { return Err((DirectFailure::OtherBus, data)) };
+        let slave = self.drive_of(axis).and_then(Drive::present_slave);
+        let Some(slave) = slave else { return Err((DirectFailure::NoDrive, data)) };
+        if !self.direct.is_free() {
+            return Err((DirectFailure::Unsent, data));
+        }
+        let operation = if write { SvcOperation::Write(element) } else { SvcOperation::Read(element) };
+        match self.master.svc_submit(slave, SvcRequest::new(idn, operation).with_buffer(data)) {
+            Ok(ticket) => {
+                self.direct.begin(ticket);
+                Ok(())
+            }
+            Err((_, request)) => Err((DirectFailure::Unsent, buffer(request.data))),
+        }
+    }
+
+    fn take_direct(&mut self) -> Option<DirectResult> {
+        self.direct.take()
+    }
+
     fn run(
         &mut self,
         now: MonotonicTime,
@@ -852,6 +887,14 @@ fn request(access: &Access) -> Option<SvcRequest> {
     Some(if access.urgent { request.urgent() } else { request })
 }
 
+/// The buffer of a direct access, which is never inline.
+fn buffer(data: SvcData) -> Vec<u8> {
+    match data {
+        SvcData::Buffer(buffer) => buffer,
+        SvcData::Inline(_) => Vec::new(),
+    }
+}
+
 /// What a request came to.
 fn reply(outcome: &SvcOutcome) -> Result<(Data, Progress), AccessFailure> {
     let reply = outcome.result.map_err(failure)?;
@@ -870,7 +913,7 @@ fn progress(status: DataStatus) -> Progress {
 
 /// What a failure of the service channel is to those who do not know it. The low twelve bits of the error code are the same
 /// for every element.
-fn failure(failure: SvcFailure) -> AccessFailure {
+pub(in crate::engine) fn failure(failure: SvcFailure) -> AccessFailure {
     let SvcFailure::Refused { code, .. } = failure else { return AccessFailure::Unanswered };
     AccessFailure::Refused(match code.0 & 0x0FFF {
         0x001 => Refusal::Unknown,

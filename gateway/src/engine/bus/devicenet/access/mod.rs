@@ -126,7 +126,7 @@ fn accepted(outcome: &Outcome) -> Result<&[u8], AccessFailure> {
 }
 
 /// What a status is to those who do not know it; `None` of success.
-fn refusal(status: GeneralStatus) -> Option<Refusal> {
+pub(in crate::engine) fn refusal(status: GeneralStatus) -> Option<Refusal> {
     Some(match status {
         GeneralStatus::SUCCESS => return None,
         GeneralStatus::ATTRIBUTE_NOT_SUPPORTED | GeneralStatus::OBJECT_DOES_NOT_EXIST => Refusal::Unknown,

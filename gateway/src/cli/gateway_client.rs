@@ -1,0 +1,65 @@
+//! A connection to the local socket of a running gateway, for the commands that are its clients.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::time::Duration;
+
+use super::CliError;
+
+/// Longest line of a reply, bytes: a value of 64 KiB is shown as text and as hexadecimal digits.
+const LINE_MAX: u64 = 2 * 1_024 * 1_024;
+
+/// Most lines of a reply: a drive has a list of up to 16384 IDNs.
+const LINES_MAX: usize = 65_536;
+
+/// A connection to the socket.
+pub struct GatewayClient {
+    stream: BufReader<UnixStream>,
+}
+
+/// A reply.
+pub struct Reply {
+    /// The lines of a list; mostly there are none.
+    pub lines: Vec<String>,
+    /// The last line, which says whether it is `ok` or an `error`.
+    pub last: String,
+}
+
+impl GatewayClient {
+    /// Connects. The gateway may take `patience` for each line of an answer.
+    pub fn connect(path: &Path, patience: Duration) -> Result<Self, CliError> {
+        let shown = path.display();
+        let stream = UnixStream::connect(path).map_err(|error| {
+            format!("no gateway answers at {shown}: {error}\nstart it with `axisbridge run --config FILE --local {shown}`")
+        })?;
+        stream.set_read_timeout(Some(patience))?;
+        stream.set_write_timeout(Some(patience))?;
+        Ok(Self { stream: BufReader::new(stream) })
+    }
+
+    /// Sends a request and waits for its reply.
+    pub fn ask(&mut self, request: &str) -> Result<Reply, CliError> {
+        let sent = self.stream.get_mut().write_all(format!("{request}\n").as_bytes());
+        sent.map_err(|error| format!("the gateway is gone: {error}"))?;
+        let mut lines = Vec::new();
+        loop {
+            let mut line = String::new();
+            let read = self.stream.by_ref().take(LINE_MAX).read_line(&mut line);
+            let read = read.map_err(|error| format!("the gateway does not answer: {error}"))?;
+            if read == 0 {
+                return Err("the gateway has closed the connection: at most four clients are let in".into());
+            }
+            let Some(text) = line.strip_suffix('\n') else {
+                return Err("the gateway sends a line without an end".into());
+            };
+            if text.starts_with("ok ") || text.starts_with("error ") {
+                return Ok(Reply { lines, last: text.to_owned() });
+            }
+            if lines.len() == LINES_MAX {
+                return Err("the gateway sends a list without an end".into());
+            }
+            lines.push(text.to_owned());
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! What the gateway knows of the parameters of its drives, before it asks them.
+
+use std::sync::Arc;
+
+use profile_cia402::drive::index::AXIS_OFFSET;
+use profile_sercos::wire::idn::Idn;
+
+use super::id::Id;
+use crate::config::{Config, DriveAt, KnownObject, is_set_by_gateway};
+use crate::mapping::{Cia402Dictionary, Dictionaries, Mapping, Object};
+
+/// The bus of a drive, with what is known of the drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Bus {
+    /// SERCOS III: the drive itself has lists of its parameters.
+    Sercos,
+    /// CANopen.
+    Can {
+        /// Where the list is from.
+        source: &'static str,
+        /// The objects of this axis and of the device, in the order of their numbers.
+        objects: Vec<KnownObject>,
+    },
+    /// DeviceNet: there is no list.
+    Devicenet,
+}
+
+impl Bus {
+    /// Its name in replies and files.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Sercos => "sercos",
+            Self::Can { .. } => "canopen",
+            Self::Devicenet => "devicenet",
+        }
+    }
+
+    /// Whether its drives have such numbers.
+    #[must_use]
+    pub const fn has(&self, id: Id) -> bool {
+        matches!(
+            (self, id),
+            (Self::Sercos, Id::Idn(_))
+                | (Self::Can { .. }, Id::Object(_))
+                | (Self::Devicenet, Id::Path { .. })
+        )
+    }
+
+    /// What is known of an object of the drive.
+    #[must_use]
+    pub fn object(&self, object: Object) -> Option<&KnownObject> {
+        let Self::Can { objects, .. } = self else { return None };
+        objects.iter().find(|known| known.object == object)
+    }
+}
+
+/// What is known of the drives of all axes.
+#[derive(Debug, Clone)]
+pub struct Catalogue {
+    dictionaries: Arc<Dictionaries>,
+    axes: Vec<Bus>,
+}
+
+impl Catalogue {
+    /// What configuration and tables say.
+    #[must_use]
+    pub fn of(config: &Config, mapping: &Mapping) -> Self {
+        let axes = config.axes.iter().map(|axis| match axis.drive {
+            DriveAt::Sercos { .. } => Bus::Sercos,
+            DriveAt::Devicenet { .. } => Bus::Devicenet,
+            DriveAt::Can { .. } => {
+                let drive = config.can_drive(axis);
+                let of_axis = drive.map_or(0, |(_, drive)| drive.axis);
+                let file = drive.and_then(|(bus, drive)| bus.device(drive.node)?.file.as_ref());
+                let (source, objects) = match file.filter(|file| !file.objects.is_empty()) {
+                    Some(file) => (
+                        "file",
+                        file.objects.iter().filter(|known| is_of(known.object, of_axis)).cloned().collect(),
+                    ),
+                    None => ("dictionary", dictionary(mapping, of_axis)),
+                };
+                Bus::Can { source, objects }
+            }
+        });
+        Self::new(axes.collect(), mapping)
+    }
+
+    /// The same of these drives, in the order of the axes.
+    #[must_use]
+    pub fn new(axes: Vec<Bus>, mapping: &Mapping) -> Self {
+        Self { axes, dictionaries: Arc::clone(&mapping.dictionaries) }
+    }
+
+    /// The drive of an axis.
+    #[must_use]
+    pub fn bus(&self, axis: usize) -> &Bus {
+        self.axes.get(axis).unwrap_or(&Bus::Devicenet)
+    }
+
+    /// The name of an IDN in the tables, without asking a drive.
+    #[must_use]
+    pub fn idn_name(&self, idn: Idn) -> Option<&str> {
+        self.dictionaries.sercos.idn(idn).map(|row| row.name.as_str()).filter(|name| !name.is_empty())
+    }
+}
+
+/// Whether an object is one of the device, or of this axis of it.
+fn is_of(object: Object, axis: u16) -> bool {
+    match object.index.checked_sub(0x6000) {
+        Some(behind) if object.index < 0xA000 => behind / AXIS_OFFSET == axis,
+        _ => true,
+    }
+}
+
+/// The objects of the tables that an axis can have, without those of the communication.
+fn dictionary(mapping: &Mapping, axis: u16) -> Vec<KnownObject> {
+    let rows = mapping.dictionaries.cia402.objects().iter();
+    let rows = rows.filter(|row| row.index < 0x1100 || (0x2000..0x6800).contains(&row.index));
+    let mut objects = Vec::new();
+    for row in rows {
+        // Rows of several objects or values that are alike stand for the first of them.
+        for sub in row.subs.iter().filter(|sub| !sub.name.is_empty() || !row.name.is_empty()) {
+            let index = match row.index {
+                0x6000.. => Cia402Dictionary::on_axis(row.index, axis),
+                index => Some(index),
+            };
+            let Some(index) = index else { continue };
+            let name = match (row.subs.len(), sub.name.is_empty() || sub.name == row.name) {
+                (1, _) | (_, true) => row.name.clone(),
+                _ => format!("{}: {}", row.name, sub.name),
+            };
+            objects.push(KnownObject {
+                object: Object { index, sub: sub.sub },
+                name,
+                data_type: sub.data_type,
+                access: sub.access,
+                unit: sub.unit.clone(),
+            });
+        }
+    }
+    objects.sort_by_key(|known| known.object);
+    objects.dedup_by_key(|known| known.object);
+    objects
+}
+
+/// Why a parameter is not written through the gateway: what it is. `None` for those that may be.
+#[must_use]
+pub fn belongs_to_gateway(id: Id) -> Option<&'static str> {
+    const COMMUNICATION: &str = "the gateway sets it for its communication with the drive";
+    const COMMAND: &str = "the gateway commands the drive with it";
+    match id {
+        Id::Idn(idn) if idn.is_product() => None,
+        Id::Idn(idn) => match idn.block() {
+            // Telegrams, timing and classes of the communication profile.
+            1..=10 | 15 | 16 | 24 | 87..=90 | 96 | 1000..=1299 => Some(COMMUNICATION),
+            // Control word and operation modes; set-points.
+            32..=37 | 47 | 48 | 80 | 81 | 134 | 258..=260 => Some(COMMAND),
+            _ => None,
+        },
+        Id::Object(object) => match object.index {
+            0x1010 | 0x1011 => {
+                Some("storing and restoring all parameters has no value that can be read back")
+            }
+            index if is_set_by_gateway(index) && index < 0x2000 => Some(COMMUNICATION),
+            index if is_set_by_gateway(index) => Some(COMMAND),
+            0x1200..=0x1BFF => Some(COMMUNICATION),
+            _ => None,
+        },
+        Id::Path { class, .. } => match class {
+            // DeviceNet, message router, connections, assemblies.
+            0x02..=0x05 => Some(COMMUNICATION),
+            _ => None,
+        },
+    }
+}
+
+/// Whether a parameter decides what the values of its drive mean: its program was made of what it was when the drive was
+/// commissioned.
+#[must_use]
+pub fn rescales(id: Id) -> bool {
+    match id {
+        Id::Idn(idn) if idn.is_product() => false,
+        Id::Idn(idn) => match idn.block() {
+            // Velocity: polarity, scaling. Position: polarity, scaling, resolution. Torque: scaling, polarity. Modulo value, gear,
+            // feed constant. Acceleration: scaling. Temperature: scaling. Resolution of the encoders.
+            43..=46 | 55 | 76..=79 | 85 | 86 | 93 | 94 | 103 | 116..=118 | 121..=123 | 160..=162 | 208 => {
+                true
+            }
+            _ => false,
+        },
+        Id::Object(object) => match object.index {
+            index @ 0x6000..=0x9FFF => matches!(
+                0x6000 + (index - 0x6000) % AXIS_OFFSET,
+                // Range of positions, polarity; notations and dimensions, resolutions, ratios, feed, factors; units.
+                0x607B | 0x607E | 0x6089..=0x608F | 0x6090..=0x6097 | 0x60A8..=0x60AA | 0x60C2
+            ),
+            _ => false,
+        },
+        // Nothing is known of the others: those of a drive profile decide nothing that is read at the start.
+        Id::Path { .. } => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mapping::Cia402Type;
+
+    fn id(text: &str) -> Id {
+        Id::parse(text).unwrap()
+    }
+
+    #[test]
+    fn what_the_gateway_sets_is_not_for_clients() {
+        for text in [
+            "S-0-0134",
+            "S-0-0047",
+            "S-0-1050.0.6",
+            "6040h",
+            "0x6840",
+            "607Ah",
+            "1600h.1",
+            "1017h",
+            "1010h.1",
+        ] {
+            assert!(belongs_to_gateway(id(text)).is_some(), "{text}");
+        }
+        for text in ["S-0-0100", "P-0-0134", "S-0-0091", "6081h", "2001h", "60FBh.1", "1.1.7", "0x2A.1.22"] {
+            assert_eq!(belongs_to_gateway(id(text)), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn scaling_is_known_on_every_axis_of_a_device() {
+        for text in ["S-0-0076", "S-0-0079", "S-0-0123", "6091h.1", "0x6891.2", "607Eh", "608Fh.1"] {
+            assert!(rescales(id(text)), "{text}");
+        }
+        for text in ["S-0-0100", "P-0-0076", "6081h", "0x6081.0", "2091h", "1.1.7"] {
+            assert!(!rescales(id(text)), "{text}");
+        }
+    }
+
+    #[test]
+    fn objects_of_an_axis_are_those_of_its_range() {
+        let mapping = Mapping::embedded().unwrap();
+        for (axis, velocity) in [(0, 0x6081), (2, 0x7081)] {
+            let objects = dictionary(&mapping, axis);
+            let known =
+                objects.iter().find(|known| known.object.index == velocity).expect("profile velocity");
+            assert_eq!((known.name.as_str(), known.data_type), ("Profile velocity", Some(Cia402Type::U32)));
+            assert!(known.is_kept());
+            let behind = |known: &KnownObject| is_of(known.object, axis);
+            assert!(objects.iter().all(behind), "no object of another axis");
+            assert!(objects.windows(2).all(|pair| pair[0].object < pair[1].object), "in order, and once");
+        }
+        let objects = dictionary(&mapping, 0);
+        let word = objects.iter().find(|known| known.object.index == 0x6040).expect("controlword");
+        assert!(!word.is_kept(), "the gateway's");
+    }
+}

@@ -1,0 +1,368 @@
+//! Parameters of drives by the number that they have there: a line of local control, its accesses in the engine and on the bus, the
+//! drive, and the reply.
+
+use axisbridge::config::Config;
+use axisbridge::engine::direct::{DirectEnd, DirectNorth, DirectRequest};
+use axisbridge::engine::local::{ClientEnd, LocalNorth, Order, Request};
+use axisbridge::local::drive::job::{Context, Job, Step};
+use axisbridge::local::drive::known::Catalogue;
+use axisbridge::local::protocol;
+use axisbridge_tests::rig::motion::millis;
+use axisbridge_tests::rig::{BOX, Rig, Settings};
+use profile_cia402::node::dictionary::{self, DataType};
+use profile_cia402::wire::Mux;
+use profile_cip::controller::Step as Move;
+use profile_generic::inhibit::Inhibits;
+use profile_generic::state::DriveState;
+use profile_sercos::slave::parameter::Definition;
+use profile_sercos::wire::idn::Idn;
+
+/// The axes of both configurations.
+const AXES: [&str; 2] = ["turntable", "slide"];
+
+/// A box with local control, and a client.
+struct Bench {
+    rig: Rig,
+    orders: ClientEnd,
+    end: DirectEnd,
+    catalogue: Catalogue,
+    ids: u32,
+}
+
+impl Bench {
+    /// On a rig whose drives are not up yet.
+    fn new(mut rig: Rig, configuration: &str) -> Self {
+        let (local, orders) = LocalNorth::new(rig.engine.axes().len());
+        rig.engine.set_local(local);
+        let (direct, end) = DirectNorth::new();
+        rig.engine.set_direct(direct);
+        rig.until_ready();
+        rig.run_for(millis(200));
+        let config = Config::parse(configuration, "box.toml").expect("a configuration");
+        let catalogue = Catalogue::of(&config, rig.engine.mapping());
+        Self { rig, orders, end, catalogue, ids: 0 }
+    }
+
+    fn sercos(prepare: impl FnOnce(&mut Rig)) -> Self {
+        let mut rig = Rig::new(Settings::default());
+        prepare(&mut rig);
+        Self::new(rig, BOX)
+    }
+
+    fn canopen(more: &str, prepare: impl FnOnce(&mut Rig)) -> Self {
+        let configuration = format!("{}{more}", include_str!("can.toml"));
+        let settings =
+            Settings { configuration: configuration.clone(), drives: Vec::new(), ..Settings::default() };
+        let mut rig = Rig::new(settings);
+        prepare(&mut rig);
+        Self::new(rig, &configuration)
+    }
+
+    /// The reply to a line.
+    fn say(&mut self, line: &str) -> String {
+        self.say_while(line, |_, _| {})
+    }
+
+    /// The reply to a line; `ahead` is called ahead of each access, with its number.
+    fn say_while(&mut self, line: &str, mut ahead: impl FnMut(&mut Rig, usize)) -> String {
+        let axes = AXES.map(str::to_owned);
+        let request = protocol::parse(line, &axes, &[]).expect(line);
+        let protocol::Request::Drive { axis, ask } = request else { panic!("{line}: {request:?}") };
+        let context = Context {
+            axis: AXES[axis],
+            bus: self.catalogue.bus(axis),
+            catalogue: &self.catalogue,
+            named: "",
+        };
+        let (mut job, mut step) = match Job::begin(ask, &context) {
+            Ok(begun) => begun,
+            Err(reply) => return reply,
+        };
+        for number in 0..20 {
+            ahead(&mut self.rig, number);
+            match step {
+                Step::Reply(reply) => return reply,
+                Step::Access(target, direction, data) => {
+                    self.ids += 1;
+                    let axis = u8::try_from(axis).expect("few axes");
+                    let id = self.ids;
+                    let request = DirectRequest { client: 3, id, axis, target, direction, data };
+                    self.end.requests.push(request).expect("room");
+                }
+            }
+            let answer = loop {
+                if let Ok(answer) = self.end.answers.pop() {
+                    break answer;
+                }
+                self.rig.run_for(millis(1));
+            };
+            assert_eq!((answer.client, answer.id), (3, self.ids));
+            step = job.take(answer, &context);
+        }
+        panic!("no end of {line}");
+    }
+
+    fn object(&mut self, line: &str) -> serde_json::Value {
+        let reply = self.say(line);
+        let start = reply.find('{').unwrap_or_else(|| panic!("{line} gives {reply}"));
+        assert!(reply.starts_with("ok "), "{reply}");
+        serde_json::from_str(&reply[start..]).expect("an object")
+    }
+
+    /// Enables the turntable as another client.
+    fn enable(&mut self) {
+        self.orders
+            .requests
+            .push(Request::Order { client: 2, id: 8, axis: 0, order: Order::Enable })
+            .expect("room");
+        self.rig.run_until(millis(5_000), "an enabled axis", |rig| {
+            rig.engine.axes()[0].state() == DriveState::Operating
+        });
+    }
+}
+
+fn held(bench: &Bench, idn: Idn) -> i64 {
+    bench.rig.line.slaves()[0].store().number_of(idn)
+}
+
+fn object_of(bench: &mut Bench, index: u16, sub: u8) -> i64 {
+    bench.rig.can[0].bus.nodes_mut().next().expect("a device").dictionary().number(index, sub)
+}
+
+/// A gain of the vendor with everything that an IDN can have.
+const GAIN: &str = "P-0-4000";
+
+fn with_gain(rig: &mut Rig) {
+    let gain = Definition::value(GAIN.parse().expect("an IDN"), 0x0221_0001, "Own gain", -125);
+    rig.line.slaves_mut()[0].store_mut().define(gain.unit("A").range(-1_000, 1_000));
+}
+
+#[test]
+fn the_elements_of_an_idn_are_shown_as_its_attribute_says() {
+    let mut bench = Bench::sercos(with_gain);
+    let shown = bench.say("read turntable P-0-4000");
+    let expected = "ok read turntable {\"id\":\"P-0-4000\",\"name\":\"Own gain\",\"type\":\"2 byte signed, 2 decimals\",\
+                    \"unit\":\"A\",\"minimum\":\"-10.00\",\"maximum\":\"10.00\",\"attribute\":\"0x02210001\",\
+                    \"value\":\"-1.25\",\"data\":\"83ff\"}\n";
+    assert_eq!(shown, expected);
+    let brief = bench.object("read turntable P-0-4000 brief");
+    assert_eq!((&brief["name"], &brief["value"]), (&"Own gain".into(), &"-1.25".into()));
+    assert_eq!((&brief["unit"], &brief["minimum"]), (&serde_json::Value::Null, &serde_json::Value::Null));
+    // Longer than a request of the cycle: a list of hundreds of IDNs, and a text.
+    let all = bench.object("read turntable S-0-0017");
+    let value = all["value"].as_str().expect("text");
+    assert!(value.split(',').count() > 100 && value.split(',').any(|idn| idn == "S-0-0134"), "{value}");
+    assert_eq!(all["data"].as_str().map(str::len), Some(8 * value.split(',').count()));
+    let reply = bench.say("read turntable P-0-0001");
+    assert_eq!(
+        reply,
+        "error read turntable absent: P-0-0001: the drive refuses the IDN with 0x1001: IDN not available\n"
+    );
+    let other = "error read turntable no-parameter: 6081:00 is a number of CANopen drives: the drive of this axis is another one\n";
+    assert_eq!(bench.say("read turntable 6081h"), other);
+}
+
+#[test]
+fn an_idn_is_written_and_read_back_and_the_drives_own_words_are_in_a_refusal() {
+    let mut bench = Bench::sercos(with_gain);
+    let gain: Idn = GAIN.parse().expect("an IDN");
+    let written = bench.object("write turntable P-0-4000 3.5");
+    assert_eq!((&written["before"], &written["value"]), (&"-1.25".into(), &"3.50".into()));
+    assert_eq!(held(&bench, gain), 350);
+    for (line, reply) in [
+        (
+            "write turntable P-0-4000 10.01",
+            "error write turntable value: P-0-4000: the drive refuses the operation data with 0x7007: operation data is above \
+             the maximum\n",
+        ),
+        (
+            "write turntable P-0-4000 hex:010203",
+            "error write turntable value: P-0-4000: 3 bytes to write where 2 are needed\n",
+        ),
+        (
+            "write turntable P-0-4000 1.255",
+            "error write turntable value: `1.255` is not a number with at most 2 decimals\n",
+        ),
+        (
+            "write turntable S-0-0148 3",
+            "error write turntable command: S-0-0148 is a procedure command: it is executed, not written\n",
+        ),
+        (
+            "write turntable S-0-0134 0",
+            "error write turntable gateway: S-0-0134 is not written: the gateway commands the drive with it\n",
+        ),
+    ] {
+        assert_eq!(bench.say(line), reply, "{line}");
+    }
+    // The scaling is write protected in CP4.
+    let reply = bench.say("write turntable S-0-0079 360000");
+    assert!(
+        reply.starts_with(
+            "error write turntable refused: S-0-0079: the drive refuses the operation data with 0x70"
+        ),
+        "{reply}"
+    );
+    assert_eq!(held(&bench, gain), 350, "nothing of that reached the drive");
+}
+
+#[test]
+fn a_drive_that_accepts_a_value_and_does_not_keep_it_is_named_with_both() {
+    let mut bench = Bench::sercos(with_gain);
+    let gain: Idn = GAIN.parse().expect("an IDN");
+    // The value as it is, the write, and then what the drive has made of it.
+    let reply = bench.say_while("write turntable P-0-4000 3.5", |rig, number| {
+        if number == 2 {
+            rig.line.slaves_mut()[0].store_mut().set_number_of(gain, 349);
+        }
+    });
+    assert_eq!(
+        reply,
+        "error write turntable not-kept: the drive took P-0-4000 = 3.50 and has 3.49 afterwards\n"
+    );
+    let mut bench = Bench::canopen("", |_| {});
+    let reply = bench.say_while("write turntable 6081h 5", |rig, number| {
+        if number == 2 {
+            rig.can[0].bus.nodes_mut().next().expect("a device").dictionary_mut().set(0x6081, 0, 4);
+        }
+    });
+    assert_eq!(reply, "error write turntable not-kept: the drive took 6081:00 = 5 and has 4 afterwards\n");
+}
+
+#[test]
+fn an_object_of_unknown_type_is_shown_as_bytes_and_written_with_its_type() {
+    let mut bench = Bench::canopen("", |rig| {
+        let node = rig.can[0].bus.nodes_mut().next().expect("a device");
+        node.dictionary_mut().add(Mux::new(0x2100, 0), dictionary::Definition::new("Own", DataType::I16, -2));
+    });
+    let own = bench.object("read turntable 2100h");
+    assert_eq!((&own["value"], &own["type"]), (&"hex:feff".into(), &serde_json::Value::Null));
+    let reply = bench.say("write turntable 2100h 9");
+    assert!(
+        reply.starts_with(
+            "error write turntable value: the type of the parameter is not known: write it as u16:9"
+        ),
+        "{reply}"
+    );
+    let written = bench.object("write turntable 2100h i16:-9");
+    assert_eq!((&written["value"], &written["before"]), (&"hex:f7ff".into(), &"hex:feff".into()));
+    assert_eq!(object_of(&mut bench, 0x2100, 0), -9);
+}
+
+#[test]
+fn objects_are_read_and_written_by_the_types_of_the_dictionary() {
+    let mut bench = Bench::canopen("", |_| {});
+    let velocity = bench.object("read turntable 6081h");
+    assert_eq!((&velocity["name"], &velocity["type"]), (&"Profile velocity".into(), &"u32".into()));
+    let before = object_of(&mut bench, 0x6081, 0);
+    assert_eq!(velocity["value"], before.to_string());
+    let written = bench.object("write turntable 0x6081.0 12345");
+    assert_eq!((&written["before"], &written["value"]), (&before.to_string().into(), &"12345".into()));
+    assert_eq!(written["data"], "39300000");
+    assert_eq!(object_of(&mut bench, 0x6081, 0), 12_345);
+    for (line, reply) in [
+        (
+            "read turntable 2ABCh",
+            "error read turntable absent: 2ABC:00: the drive refuses it with 0x06020000: object does not exist\n",
+        ),
+        (
+            "write turntable 6081h -1",
+            "error write turntable value: `-1` is not a number from 0 to 4294967295\n",
+        ),
+        (
+            "write turntable 6041h 0",
+            "error write turntable read-only: 6041:00: the drive refuses it with 0x06010002: attempt to write a read-only object\n",
+        ),
+        (
+            "write turntable 6040h 15",
+            "error write turntable gateway: 6040:00 is not written: the gateway commands the drive with it\n",
+        ),
+        (
+            "write turntable 1A00h.1 0",
+            "error write turntable gateway: 1A00:01 is not written: the gateway sets it for its communication with the drive\n",
+        ),
+    ] {
+        assert_eq!(bench.say(line), reply, "{line}");
+    }
+    let name = bench.object("read turntable 1008h");
+    assert_eq!(name["type"], "visible_string");
+    assert!(name["value"].as_str().is_some_and(|name| name.starts_with("Axisbridge")), "{name}");
+}
+
+#[test]
+fn nothing_is_written_while_somebody_controls_the_axis_and_everything_is_read() {
+    let mut bench = Bench::sercos(with_gain);
+    let gain: Idn = GAIN.parse().expect("an IDN");
+    bench.enable();
+    let reply = bench.say("write turntable P-0-4000 1");
+    assert_eq!(reply, "error write turntable held: P-0-4000: a client of local control has this axis\n");
+    assert_eq!(bench.object("read turntable P-0-4000")["value"], "-1.25");
+    // The other axis is another drive.
+    assert_eq!(bench.object("write slide S-0-0104 2.5")["value"], "2.50");
+    bench.rig.connect(vec![Move::Dwell { seconds: 1_000.0 }]);
+    bench.rig.run_until(millis(60_000), "a controller", |rig| rig.engine.axes()[0].has_controller());
+    bench.rig.run_for(millis(100));
+    let reply = bench.say("write turntable P-0-4000 1");
+    assert_eq!(
+        reply,
+        "error write turntable controller: P-0-4000: a controller is connected to the device of this axis\n"
+    );
+    assert_eq!(bench.object("read turntable P-0-4000")["value"], "-1.25");
+    assert_eq!(held(&bench, gain), -125);
+    bench.rig.cable = false;
+    let reply = bench.say("read turntable P-0-4000");
+    assert!(reply.starts_with("error read turntable unanswered: P-0-4000: "), "{reply}");
+}
+
+#[test]
+fn an_axis_whose_drive_was_rescaled_is_not_enabled_before_the_drive_was_commissioned_again() {
+    let mut bench = Bench::canopen("", |_| {});
+    let written = bench.object("write turntable 6091h.1 2");
+    assert_eq!((&written["value"], &written["recommission"]), (&"2".into(), &true.into()));
+    let inhibits = |bench: &Bench| bench.rig.engine.axes()[0].feedback().inhibits;
+    bench.rig.run_for(millis(100));
+    assert!(inhibits(&bench).contains(Inhibits::TRANSFER_ACTIVE));
+    assert!(
+        !bench.rig.engine.axes()[1].feedback().inhibits.contains(Inhibits::TRANSFER_ACTIVE),
+        "another device"
+    );
+    bench
+        .orders
+        .requests
+        .push(Request::Order { client: 2, id: 8, axis: 0, order: Order::Enable })
+        .expect("room");
+    for _ in 0..3_000 {
+        bench.rig.run_for(millis(1));
+        assert!(!bench.rig.engine.axes()[0].may_have_torque());
+    }
+    // The device is switched off and on: it is commissioned again, with the scaling that it has now.
+    let now = bench.rig.clock().get();
+    bench.rig.can[0].bus.nodes_mut().next().expect("a device").power_cycle(now);
+    bench.rig.run_until(millis(20_000), "the drive", |rig| {
+        !rig.engine.axes()[0].feedback().inhibits.contains(Inhibits::TRANSFER_ACTIVE)
+            && rig.engine.axes()[0].south().is_some()
+    });
+}
+
+#[test]
+fn lists_say_where_they_are_from() {
+    let mut bench = Bench::sercos(with_gain);
+    let list = bench.say("list turntable backup");
+    let last = list.lines().last().unwrap_or_default();
+    let count = list.lines().count() - 1;
+    assert_eq!(last, format!("ok list turntable {count} bus=sercos source=S-0-0192"));
+    assert!(list.contains("parameter S-0-0104 name=Position loop K"), "{list}");
+    assert!(!list.contains("parameter S-0-0134"), "{list}");
+    let all = bench.say("list turntable");
+    assert!(
+        all.contains("parameter S-0-0134 name=") && all.ends_with("bus=sercos source=S-0-0017\n"),
+        "{all}"
+    );
+    let mut bench = Bench::canopen("", |_| {});
+    let list = bench.say("list slide backup");
+    assert!(
+        list.contains("parameter 6081:00 access=rw type=u32 unit=velocity name=Profile velocity\n")
+            || list.contains("parameter 6081:00 access=rw type=u32 name=Profile velocity\n"),
+        "{list}"
+    );
+    assert!(list.ends_with(" bus=canopen source=dictionary\n") && !list.contains("6040:00"), "{list}");
+}
