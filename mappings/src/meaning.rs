@@ -5,13 +5,16 @@
 
 use std::fmt::{Debug, Write as _};
 
+use profile_generic::image::StatusBits;
 use profile_generic::program::BitPattern;
 
 use crate::cia402::{
-    ReportRule as Cia402ReportRule, StepKind as Cia402StepKind, StepRule as Cia402StepRule, Tells,
+    ActionRule as Cia402ActionRule, ReportRule as Cia402ReportRule, StatusRule as Cia402StatusRule,
+    StepKind as Cia402StepKind, StepRule as Cia402StepRule, Tells,
 };
 use crate::drive_program::FaultRow;
-use crate::sercos::tables::{ReportRule, StepKind, StepRule};
+use crate::sercos::scaling::{Method, ScalingRule};
+use crate::sercos::tables::{ReportRule, StatusRule as SercosStatusRule, StepKind, StepRule};
 use crate::{Cia402Tables, CipTables, Mapping, SercosTables};
 
 impl Mapping {
@@ -96,6 +99,91 @@ fn cia402_reports(rules: &[Cia402ReportRule]) -> String {
     text
 }
 
+/// Actions by what each comes to in every status word: the first row for the state, else the one for every other state.
+fn cia402_actions(rules: &[Cia402ActionRule]) -> String {
+    let mut text = String::new();
+    let mut actions: Vec<_> = rules.iter().map(|rule| rule.action).collect();
+    actions.sort_unstable_by_key(|action| action.name());
+    actions.dedup();
+    for word in words(rules.iter().filter_map(|rule| rule.when)) {
+        for action in &actions {
+            let own = || rules.iter().filter(|rule| rule.action == *action);
+            let of_state = own().find(|rule| rule.when.is_some_and(|when| when.matches(word)));
+            let rule = of_state.or_else(|| own().find(|rule| rule.when.is_none()));
+            let _ = writeln!(text, "{word:04X} {action} {:?}", rule.map(|rule| rule.pattern));
+        }
+    }
+    text
+}
+
+/// Status bits, which are added up, by what comes of every value of their word; rows of one word are alternatives.
+fn sercos_status(rules: &[SercosStatusRule]) -> String {
+    let mut text = String::new();
+    let mut idns: Vec<_> = rules.iter().map(|rule| rule.word).collect();
+    idns.sort_unstable();
+    idns.dedup();
+    for idn in idns {
+        let own = || rules.iter().filter(|rule| rule.word == idn);
+        for word in words(own().map(|rule| rule.pattern)) {
+            for acknowledges in [false, true] {
+                let fits = |rule: &&SercosStatusRule| {
+                    rule.pattern.matches(word)
+                        && rule.acknowledges.is_none_or(|wanted| wanted == acknowledges)
+                };
+                let bits = own().filter(fits).fold(StatusBits::empty(), |bits, rule| bits | rule.bit);
+                let _ = writeln!(text, "{idn} {word:04X} {acknowledges} {bits:?}");
+            }
+        }
+    }
+    text
+}
+
+/// The same of CiA 402, as [`cia402_reports`].
+fn cia402_status(rules: &[Cia402StatusRule]) -> String {
+    let mut text = String::new();
+    let mut modes: Vec<i8> = rules.iter().flat_map(|rule| rule.modes.iter().copied()).chain([0]).collect();
+    modes.sort_unstable();
+    modes.dedup();
+    let mut objects: Vec<_> = rules.iter().map(|rule| rule.object).collect();
+    objects.sort_unstable_by_key(|object| (object.index, object.sub));
+    objects.dedup();
+    for object in objects {
+        let own = || rules.iter().filter(|rule| rule.object == object);
+        for word in words(own().map(|rule| rule.pattern)) {
+            for mode in &modes {
+                for (follows, voltage) in [(false, false), (false, true), (true, false), (true, true)] {
+                    let tells = Tells { follows, voltage };
+                    let fits = |rule: &&Cia402StatusRule| {
+                        rule.pattern.matches(word)
+                            && (rule.modes.is_empty() || rule.modes.contains(mode))
+                            && rule.drives.include(tells)
+                    };
+                    let none = (StatusBits::empty(), StatusBits::empty());
+                    let bits = own()
+                        .filter(fits)
+                        .fold(none, |bits, rule| (bits.0 | rule.bit, bits.1 | rule.inverted));
+                    let _ = writeln!(text, "{object} {word:04X} {mode} {tells:?} {bits:?}");
+                }
+            }
+        }
+    }
+    text
+}
+
+/// Methods of which the first that fits the scaling type wins, by what every type comes to.
+fn sercos_methods(rule: &mut ScalingRule) -> String {
+    let methods = std::mem::take(&mut rule.methods);
+    // Every one of them may name parameters that are read, whether it wins or not.
+    let reads = |method: &Method| format!("{:?}", [method.factor, method.exponent, method.divisor]);
+    let mut text = unordered(&methods.iter().map(reads).collect::<Vec<_>>());
+    for word in words(methods.iter().map(|method| method.pattern)) {
+        let method = methods.iter().find(|method| method.pattern.matches(word));
+        let method = method.map(|method| Method { pattern: BitPattern::new(0, 0), ..method.clone() });
+        let _ = writeln!(text, "\n{word:02X} {method:?}");
+    }
+    text
+}
+
 impl CipTables {
     fn meaning(&self) -> String {
         let mut rest = self.clone();
@@ -145,12 +233,14 @@ impl SercosTables {
             mode.command.sort_unstable_by_key(|signal| format!("{signal:?}"));
             mode.actual.sort_unstable_by_key(|signal| format!("{signal:?}"));
         }
-        // Each is found by its signal, parameter, mode or edge, of which there is one row; status bits are added up.
+        let methods: Vec<String> = rest.scalings.iter_mut().map(sercos_methods).collect();
+        // Each is found by its signal, parameter, mode or edge, of which there is one row.
         let lists = [
+            methods.join("\n"),
             sercos_reports(&std::mem::take(&mut rest.reports)),
             unordered(&std::mem::take(&mut rest.signals)),
             unordered(&std::mem::take(&mut rest.procedures)),
-            unordered(&std::mem::take(&mut rest.status)),
+            sercos_status(&std::mem::take(&mut rest.status)),
             unordered(&std::mem::take(&mut rest.parameters)),
             unordered(&std::mem::take(&mut rest.captures)),
         ];
@@ -166,9 +256,16 @@ impl SercosTables {
         {
             steps.sort_unstable_by_key(|rule| format!("{rule:?}"));
         }
-        // Steps that only read, one behind the other, read the same in any order: none of them asks what another has found.
+        // Steps that only read, one behind the other, read the same in any order: the steps of a phase are planned before the first of
+        // them is done, and none of them asks what another has found.
         let reads = |rule: &StepRule| {
-            let only = [StepKind::ReadParameters, StepKind::ReadProcedures, StepKind::ReadCaptures];
+            let only = [
+                StepKind::ReadScaling,
+                StepKind::ReadTelegram,
+                StepKind::ReadParameters,
+                StepKind::ReadProcedures,
+                StepKind::ReadCaptures,
+            ];
             matches!(rule.kind, StepKind::Read { .. }) || only.contains(&rule.kind)
         };
         for steps in rest.steps.chunk_by_mut(|one, next| one.phase == next.phase && reads(one) && reads(next))
@@ -196,9 +293,28 @@ impl Cia402Tables {
         rest.signals.iter_mut().for_each(|rule| rule.modes.sort_unstable());
         rest.status.iter_mut().for_each(|rule| rule.modes.sort_unstable());
         rest.steps.iter_mut().for_each(|rule| rule.modes.sort_unstable());
-        // Objects that are written one behind the other are each an option of their own, and the drive has no torque yet.
+        // What a drive is asked is planned before the first question, and all of it comes before anything is written.
+        let asks = |rule: &Cia402StepRule| {
+            matches!(
+                rule.kind,
+                Cia402StepKind::Read(_)
+                    | Cia402StepKind::ReadScaling
+                    | Cia402StepKind::ReadParameters
+                    | Cia402StepKind::ReadCaptures
+            )
+        };
+        let (asked, told) = std::mem::take(&mut rest.steps).into_iter().partition(asks);
+        let asked: Vec<Cia402StepRule> = asked;
+        rest.steps = told;
+        // Objects that are written one behind the other are each an option of their own, and the drive has no torque yet. The cycle is
+        // read back, and nothing else is made of that.
         let writes = |rule: &Cia402StepRule| {
-            matches!(rule.kind, Cia402StepKind::Write(..) | Cia402StepKind::WriteParameter(_))
+            matches!(
+                rule.kind,
+                Cia402StepKind::Write(..)
+                    | Cia402StepKind::WriteParameter(_)
+                    | Cia402StepKind::WriteCycle(..)
+            )
         };
         for steps in rest.steps.chunk_by_mut(|one, next| writes(one) && writes(next)) {
             steps.sort_unstable_by_key(|rule| format!("{rule:?}"));
@@ -210,11 +326,13 @@ impl Cia402Tables {
         }
         // As for SERCOS. Of error codes there are so few that all of them are looked at.
         let lists = [
+            unordered(&asked),
+            cia402_actions(&std::mem::take(&mut rest.actions)),
             by_code(&std::mem::take(&mut rest.faults)),
             cia402_reports(&std::mem::take(&mut rest.reports)),
             unordered(&std::mem::take(&mut rest.signals)),
             unordered(&std::mem::take(&mut rest.procedures)),
-            unordered(&std::mem::take(&mut rest.status)),
+            cia402_status(&std::mem::take(&mut rest.status)),
             unordered(&std::mem::take(&mut rest.parameters)),
             unordered(&std::mem::take(&mut rest.captures)),
         ];
@@ -253,6 +371,24 @@ mod tests {
             ),
             // Its class is reported as the same.
             ("generic-cia402.toml", "\"Position controller\", ", ""),
+            // What both patterns take, a method before has taken.
+            (
+                "generic-sercos.toml",
+                "pattern = [0x3F, 0x01], name = \"newton, preferential\"",
+                "pattern = [0x3E, 0x00], name = \"newton, preferential\"",
+            ),
+            // Both send the same, and so does the row for every other state.
+            (
+                "generic-cia402.toml",
+                "  { action = \"enable\", when = \"Switch on disabled\", send = \"Shutdown\", source = \"RS PY NT AB SSC: transition 2\" },\n",
+                "",
+            ),
+            // A row for drives without bit 12 shows the same.
+            (
+                "generic-cia402.toml",
+                "modes = [\"csp\", \"csv\", \"cst\"], follows = true, status = \"tracking\"",
+                "modes = [\"csp\", \"csv\", \"cst\"], status = \"tracking\"",
+            ),
         ] {
             assert_eq!(with(file, from, to).meaning(), shipped, "{from}");
         }
@@ -274,6 +410,18 @@ mod tests {
             ),
             ("generic-cia402.toml", "\"Velocity controller\"", "\"Motor\""),
             ("generic-cia402.toml", "modes = [\"csv\", \"pv\"]", "modes = [\"pv\", \"csv\"]"),
+            (
+                "generic-sercos.toml",
+                "pattern = [0x3F, 0x02], name = \"newton metre",
+                "pattern = [0x37, 0x02], name = \"newton metre",
+            ),
+            (
+                "generic-cia402.toml",
+                "when = \"Switched on\", send = \"Enable operation\"",
+                "when = \"Switched on\", send = \"Switch on\"",
+            ),
+            ("generic-cia402.toml", "follows = false, status = \"tracking\"", "status = \"tracking\""),
+            ("generic-sercos.toml", "status = \"tracking\", acknowledges = false", "status = \"tracking\""),
         ] {
             assert_ne!(with(file, from, to).meaning(), shipped, "{from}");
         }

@@ -654,6 +654,10 @@ impl Builder<'_> {
                 "the attribute is defined twice",
             );
         }
+        if row.range.is_some() && attribute.data_type.width().is_none() {
+            let message = "expected no `range` for an attribute that is no number";
+            self.resolver.error(code::CONTRADICTION, row.attribute.span(), "range", message);
+        }
         let range = match served {
             // What never changes can only be set to what it is.
             Served::Constant(value) => Some((value, value)),

@@ -425,6 +425,15 @@ registry! {
         "[[generic.parameter]]\nnumber = 0x8001\nname = \"area\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"write\"\n\n[[generic.parameter]]\nnumber = 0x8002\nname = \"side\"\nquantity = \"none\"\ntype = \"integer\"\naccess = \"write\"\n\n[[generic.computed]]\nparameter = \"area\"\nproduct = [\"side\", \"side\"]\nwrites = \"side\"\nsource = \"none\"",
         "Name another operand in `writes`, or give the parameter `access = \"read\"`.";
 
+    STEP_MISPLACED = 78 Error "a step of commissioning for other axes":
+        "What commissioning writes depends on the axis: the scaling of one that turns is not that of one that moves, and a drive that keeps its own scaling is not written one. Parameters come after their units were read. The step is done for other axes, or in another phase, than what it writes is made for.",
+        "[[generic-sercos.commission]]\nphase = 2\ndo = \"write\"\nidn = \"S-0-0076\"\nvalue = 0x41\nwhen = { kind = \"rotary\", set_scaling = true }\nrefused = \"continue\"\nsource = \"test\"",
+        "Write `when`, `modes` or `phase` as the finding says.";
+    WRONG_WRAP = 79 Error "a position that does not wrap":
+        "Command Position and Actual Position are DINTs that go round: an axis may turn on for ever, and at the end of the range, or at the unwind position, the next value follows the last. Velocities, accelerations and torques end at their range.",
+        "[[cip-generic.cyclic]]\nset = \"Command Data Set\"\nelement = \"Command Position\"\nwraps = false",
+        "Write `wraps` as the finding says.";
+
     CONFIG_VALUE = 80 Error "a setting that cannot be used":
         "Axisbridge cannot use the value of this key of the configuration.",
         "[south.sercos]\ncycle_time = \"1.1 ms\"",

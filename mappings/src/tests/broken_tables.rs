@@ -50,6 +50,12 @@ const CASES: &[Case] = &[
         "number = \"S-0-0375\"",
     ),
     ("no IDN", |t| &mut t.generic_sercos, "idn = \"S-0-0047\", direction", "idn = \"S-47\", direction"),
+    (
+        "range of an attribute that is a text",
+        |t| &mut t.cip_generic,
+        "{ attribute = \"Motor Catalog Number\", served_by = \"shadow\",",
+        "{ attribute = \"Motor Catalog Number\", served_by = \"shadow\", range = [0, 1],",
+    ),
     ("unknown attribute", |t| &mut t.cip_generic, "attribute = \"Kpp\"", "attribute = \"Kpq\""),
     ("unit does not convert", |t| &mut t.cip_generic, "\"position_loop_gain\"", "\"power_loss_time\""),
     ("trim that is no offset", |t| &mut t.cip_generic, "\"torque_offset\"", "\"torque_command\""),

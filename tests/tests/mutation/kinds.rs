@@ -54,6 +54,8 @@ impl fmt::Display for Kind {
 /// A text with one change.
 pub struct Mutant {
     pub kind: Kind,
+    /// Where the change begins, from 1.
+    pub line: usize,
     pub what: String,
     pub text: String,
 }
@@ -243,6 +245,10 @@ fn changes(value: &Value<'_>) -> Vec<(Kind, String)> {
     found
 }
 
+fn line_of(text: &str, at: usize) -> usize {
+    text[..at].matches('\n').count() + 1
+}
+
 /// Every change of a table.
 pub fn mutants(text: &str) -> Vec<Mutant> {
     let all = rows(text);
@@ -251,8 +257,9 @@ pub fn mutants(text: &str) -> Vec<Mutant> {
         let mut text = text.to_owned();
         let mut edits = edits.to_vec();
         edits.sort_unstable();
+        let line = line_of(&text, edits[0].0);
         edits.iter().rev().for_each(|(from, to, new)| text.replace_range(*from..*to, new));
-        found.push(Mutant { kind, what, text });
+        found.push(Mutant { kind, line, what, text });
     };
     for (place, row) in all.iter().enumerate().filter(|(_, row)| row.section != "unbound") {
         let (start, end) = row.span;
@@ -266,9 +273,8 @@ pub fn mutants(text: &str) -> Vec<Mutant> {
         let next = all.get(place + 1).filter(|next| next.section == row.section);
         for value in values(text, row) {
             let Value { key, from, to, text: own } = &value;
-            let at = text[..*from].matches('\n').count() + 1;
             for (kind, new) in changes(&value) {
-                let what = format!("{} line {at}: {key} = {} -> {new}", row.name, own.trim());
+                let what = format!("{}: {key} = {} -> {new}", row.name, own.trim());
                 push(kind, what, &[(*from, *to, &new)]);
             }
             if NARROWING.contains(&key.as_str()) && text[..*from].ends_with(&format!("{key} = ")) {
@@ -276,7 +282,7 @@ pub fn mutants(text: &str) -> Vec<Mutant> {
                 let key_at = from - key.len() - 3;
                 let before = text[..key_at].trim_end();
                 let cut = if before.ends_with(',') { before.len() - 1 } else { key_at };
-                push(Kind::Widened, format!("{} line {at}: {key} left out", row.name), &[(cut, *to, "")]);
+                push(Kind::Widened, format!("{}: {key} left out", row.name), &[(cut, *to, "")]);
             }
             let top = row.keys.iter().any(|(_, span)| *span == (*from, *to));
             let other = next.and_then(|next| next.keys.iter().find(|(known, _)| known == key));
@@ -284,7 +290,7 @@ pub fn mutants(text: &str) -> Vec<Mutant> {
                 let theirs = &text[*start..*end];
                 let plain = !own.contains('[') && (string(own).is_some() || number(own).is_some());
                 if plain && theirs.trim() != own.trim() && !theirs.contains('[') {
-                    let what = format!("{} line {at}: {key} {} <-> {}", row.name, own.trim(), theirs.trim());
+                    let what = format!("{}: {key} {} <-> {}", row.name, own.trim(), theirs.trim());
                     push(Kind::Swapped, what, &[(*from, *to, theirs), (*start, *end, own)]);
                 }
             }
@@ -306,7 +312,9 @@ pub fn config_mutants(text: &str) -> Vec<Mutant> {
         } else if let Some((key, value)) = plain.split_once(" = ") {
             let mut push = |kind, new: String| {
                 let what = format!("{table} {key} = {value} -> {}", new.trim());
-                found.push(Mutant { kind, what, text: format!("{}{new}\n{}", &text[..begin], &text[end..]) });
+                let line = line_of(text, begin);
+                let text = format!("{}{new}\n{}", &text[..begin], &text[end..]);
+                found.push(Mutant { kind, line, what, text });
             };
             push(Kind::Removed, String::new());
             if let Some((from, to)) = number(value).filter(|_| !value.contains(':')) {

@@ -46,8 +46,10 @@ struct Drive {
 pub(super) struct Tap {
     bus: InProcessCan,
     known: Vec<Drive>,
-    /// Objects that a drive holds in place of its own.
-    held: Vec<(usize, Object, Vec<u8>)>,
+    /// The drives of the bus: their names and node-ids.
+    nodes: Vec<(String, u8)>,
+    /// Objects that a node holds in place of its own.
+    held: Vec<(u8, Object, Vec<u8>)>,
     /// Answers about these.
     answers: VecDeque<Frame>,
     pub peers: Vec<Peer>,
@@ -58,6 +60,7 @@ impl Tap {
         Self {
             bus: InProcessCan::of(config, None),
             known: Vec::new(),
+            nodes: config.drives.iter().map(|drive| (drive.name.clone(), drive.node.get())).collect(),
             held: Vec::new(),
             answers: VecDeque::new(),
             peers: (0..axes).map(|_| Peer::default()).collect(),
@@ -83,8 +86,21 @@ impl Tap {
 
     /// The drive of an axis holds this in place of its own value.
     pub fn hold(&mut self, axis: usize, object: Object, bytes: &[u8]) {
-        self.held.retain(|(known, of, _)| (*known, *of) != (axis, object));
-        self.held.push((axis, object, bytes.to_vec()));
+        if let Some(node) = self.known.iter().find(|drive| drive.axis == axis).map(|drive| drive.node) {
+            self.hold_at(node, object, bytes);
+        }
+    }
+
+    /// The same before it is known which axis has the drive, until [`Self::release`].
+    pub fn commission_with(&mut self, drive: &str, object: Object, bytes: &[u8]) {
+        if let Some((_, node)) = self.nodes.iter().find(|(name, _)| name == drive) {
+            self.hold_at(*node, object, bytes);
+        }
+    }
+
+    fn hold_at(&mut self, node: u8, object: Object, bytes: &[u8]) {
+        self.held.retain(|(known, of, _)| (*known, *of) != (node, object));
+        self.held.push((node, object, bytes.to_vec()));
     }
 
     /// What the drive of an axis holds; `None` of a drive without the object.
@@ -105,9 +121,7 @@ impl Tap {
         let [UPLOAD, low, high, sub, ..] = *data else { return None };
         let object = Object { index: u16::from_le_bytes([low, high]), sub };
         let node = id & !FUNCTION;
-        let of_node =
-            |axis: usize| self.known.iter().any(|drive| drive.axis == axis && u16::from(drive.node) == node);
-        let held = self.held.iter().find(|(axis, known, _)| *known == object && of_node(*axis));
+        let held = self.held.iter().find(|(known, of, _)| *of == object && u16::from(*known) == node);
         let (_, _, bytes) = held.filter(|(.., bytes)| (1..=4).contains(&bytes.len()))?;
         let mut data = [0; 8];
         let unused = u8::try_from(4 - bytes.len()).unwrap_or(0);

@@ -69,7 +69,9 @@ pub(super) struct Controller {
     /// Axes of the device by their numbers in the box, in the order of their instances.
     pub axes: Vec<usize>,
     pub period: DurationNs,
-    /// When the next update is due; `None` without a connection.
+    /// It has a connection.
+    pub is_open: bool,
+    /// When the next update is due; `None` without a connection, and of one that is silent.
     pub next: Option<MonotonicTime>,
     /// What each axis is told.
     pub said: Vec<Said>,
@@ -109,6 +111,7 @@ impl Controller {
             format,
             axes,
             period,
+            is_open: false,
             next: None,
             said: vec![Said { block: at_rest(), frame: None }; count],
             class: None,
@@ -128,6 +131,7 @@ impl Controller {
     /// Opens a connection; the first update goes out at `first`.
     pub fn open(&mut self, first: MonotonicTime) -> MotionRequest {
         self.opened += 1;
+        self.is_open = true;
         let count = self.axes.len();
         self.said = vec![Said { block: at_rest(), frame: None }; count];
         (self.class, self.service, self.write_ids) = (None, None, vec![0; count]);
@@ -153,7 +157,7 @@ impl Controller {
 
     /// Closes the connection.
     pub fn close(&mut self) -> MotionRequest {
-        self.next = None;
+        (self.next, self.is_open) = (None, false);
         MotionRequest::Close(CloseParameters {
             token: self.token(),
             triad: self.triad(),

@@ -42,7 +42,7 @@ use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use self::controller::{Controller, MOTOR_FEEDBACK, at_rest};
-use super::stage::{Behind, StageAxis, StageError};
+use super::stage::{Behind, Held, StageAxis, StageError};
 use crate::config::{AxisFunction, Config};
 use crate::engine::Engine;
 use crate::engine::build::{Built, Commissioners, Host, build};
@@ -78,6 +78,9 @@ const AXIS_CONTROL_AT: usize = 6;
 
 /// Update periods in which the box reads what a drive says is wrong.
 const DIAGNOSIS_PERIODS: i64 = 40;
+
+/// Update periods without an update after which an axis has lost its command, and has done what follows from that.
+const SILENT_PERIODS: i64 = 24;
 
 /// Bytes of the control word and an operating mode behind it.
 const HEAD_LEN: usize = 2;
@@ -243,8 +246,8 @@ pub(super) struct Bench {
 }
 
 impl Bench {
-    /// Commissions simulated drives as the box would.
-    pub fn new(config: &Config, mapping: Mapping) -> Result<Self, StageError> {
+    /// Commissions simulated drives as the box would, which hold these values in place of their own.
+    pub fn new(config: &Config, mapping: Mapping, held: &[Held]) -> Result<Self, StageError> {
         let host = Host { mac: SIMULATED_MAC, incarnation: 1 };
         let Built { engine, notices, commissioners, adapters, .. } = build(config, mapping, host)?;
         let axes = config.axes.len();
@@ -253,6 +256,15 @@ impl Bench {
             config.sercos.iter().map(|bus| Tap::Sercos(Box::new(sercos::Tap::new(config, bus, axes)))),
         );
         taps.extend(config.can.iter().map(|bus| Tap::Can(Box::new(can::Tap::new(bus, axes)))));
+        for Held { drive, item, bytes } in held {
+            for tap in &mut taps {
+                match (tap, item) {
+                    (Tap::Sercos(tap), Item::Idn(idn)) => tap.commission_with(drive, *idn, bytes),
+                    (Tap::Can(tap), Item::Object(object)) => tap.commission_with(drive, *object, bytes),
+                    _ => {}
+                }
+            }
+        }
         let devicenet = config.devicenet.iter();
         taps.extend(devicenet.map(|bus| Tap::Devicenet(Box::new(devicenet::Tap::new(bus, axes)))));
         let mut controllers = Vec::new();
@@ -396,7 +408,7 @@ impl Bench {
             return;
         }
         for device in 0..self.controllers.len() {
-            if self.controllers[device].next.is_some() {
+            if self.controllers[device].is_open {
                 let request = self.controllers[device].close();
                 self.request(device, request);
             }
@@ -810,6 +822,24 @@ impl Bench {
         self.used = true;
         let Member { device, place, .. } = self.members[axis];
         self.explicit(device, GET_ATTRIBUTE_SINGLE, place + 1, attribute, &[])
+    }
+
+    /// The controller of an axis sends no updates any more, and leaves its connection open; what the drive is told then.
+    pub fn silence(&mut self, axis: usize) -> Option<Told> {
+        self.used = true;
+        let Member { device, bus, .. } = self.members[axis];
+        self.controllers[device].next = None;
+        self.run_until(self.now + self.controllers[device].period * SILENT_PERIODS);
+        let peer = &self.taps[bus].peers()[axis];
+        let (_, bytes) = peer.told.as_ref()?;
+        let channel = &self.engine.axes()[axis];
+        let last = Telegram {
+            bytes: bytes.clone(),
+            command: *channel.command(),
+            action: channel.action(),
+            shown: peer.shown.clone(),
+        };
+        Some(Told { before: Vec::new(), command: last.command, last: Some(last) })
     }
 
     // ---- south ------------------------------------------------------------------------------------------------

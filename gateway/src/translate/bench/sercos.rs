@@ -71,6 +71,8 @@ impl Channel {
 pub(super) struct Tap {
     drives: InProcessDrives,
     known: Vec<Drive>,
+    /// Names of the drives, in the order of the simulated ones.
+    names: Vec<String>,
     /// Operation data that a drive holds in place of its own, by its place.
     held: Vec<(usize, Idn, i64)>,
     /// Peers of the axes of the box, by their numbers.
@@ -82,6 +84,7 @@ impl Tap {
         Self {
             drives: InProcessDrives::of(config, sercos, None),
             known: Vec::new(),
+            names: sercos.drives.iter().map(|drive| drive.name.clone()).collect(),
             held: Vec::new(),
             peers: (0..axes).map(|_| Peer::default()).collect(),
         }
@@ -118,9 +121,24 @@ impl Tap {
 
     /// The drive of an axis holds this in place of its own operation data.
     pub fn hold(&mut self, axis: usize, idn: Idn, value: i64) {
-        let Some(drive) = self.known.iter().find(|drive| drive.axis == axis) else { return };
-        self.held.retain(|(slave, known, _)| (*slave, *known) != (drive.slave, idn));
-        self.held.push((drive.slave, idn, value));
+        let Some(slave) = self.known.iter().find(|drive| drive.axis == axis).map(|drive| drive.slave) else {
+            return;
+        };
+        self.hold_at(slave, idn, value);
+    }
+
+    /// The same before it is known which axis has the drive, until [`Self::release`].
+    pub fn commission_with(&mut self, drive: &str, idn: Idn, bytes: &[u8]) {
+        if let Some(slave) = self.names.iter().position(|name| name == drive) {
+            let mut value = [0; 8];
+            value.iter_mut().zip(bytes).for_each(|(place, byte)| *place = *byte);
+            self.hold_at(slave, idn, i64::from_le_bytes(value));
+        }
+    }
+
+    fn hold_at(&mut self, slave: usize, idn: Idn, value: i64) {
+        self.held.retain(|(known, of, _)| (*known, *of) != (slave, idn));
+        self.held.push((slave, idn, value));
     }
 
     /// The operation data that the drive of an axis holds; `None` of a drive without the parameter.

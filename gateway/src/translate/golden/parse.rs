@@ -20,6 +20,7 @@
 //! | `set ATTRIBUTE X` | the controller sets an attribute |
 //! | `holds ITEM N` | the drive holds this value |
 //! | `generic NAME N` | a parameter or set-point of the generic model has this value, for a drive that has all of them |
+//! | `silence` | the controller sends no updates any more, up to the end of the group |
 //! | `commissioned` | nothing |
 //!
 //! | what must come of it | |
@@ -79,6 +80,7 @@ pub(super) enum Done {
     Set { attribute: u16, value: f64 },
     Holds(Item, i64),
     Generic(Generic, i64),
+    Silence,
     Commissioned,
 }
 
@@ -175,6 +177,7 @@ fn done(text: &str) -> Result<Done, String> {
             let generic = signal.or_else(|| Parameter::from_name(name).map(Generic::Parameter));
             Done::Generic(generic.ok_or("a parameter or signal")?, number(value)?)
         }
+        "silence" => Done::Silence,
         "commissioned" => Done::Commissioned,
         _ => {
             let words: Vec<&str> = text.split_whitespace().collect();

@@ -18,7 +18,7 @@ use crate::mapping::{
     AttributeEntry, Backing, Cia402Axis, DriveProgram, Item, Mapping, ObjectFacts, Origin, SercosAxis,
 };
 use crate::translate::bench::{Bench, Told};
-use crate::translate::stage::{Behind, Stage, StageAxis};
+use crate::translate::stage::{Behind, Stage, StageAxis, ValuesError};
 use crate::translate::tree::hex;
 
 /// Attributes of the trims, Tables 5-2.40, 5-2.42 and 5-2.46.
@@ -42,12 +42,19 @@ pub(super) fn play(
     let axes = stage.axes.clone();
     for group in &place.groups {
         stage.axes.clone_from(&axes);
-        stage = stage.with_values(&group.values).map_err(|error| format!("{}: {error}", group.title))?;
-        let bench = stage.bench().map_err(|error| error.to_string())?;
-        let mut player = Player { stage: &stage, bench, able: BTreeMap::new(), axes: BTreeMap::new() };
+        let failed = |error: ValuesError| format!("{}: {error}", group.title);
+        stage = stage.with_values(&group.values).map_err(failed)?;
+        // A drive of other modes gets other telegrams: it is commissioned for its group alone.
+        let own = match stage.has_telegrams_of(&axes) {
+            true => None,
+            false => Some(stage.rehearse_with(&group.values).map_err(failed)?),
+        };
+        let on = own.as_ref().unwrap_or(&stage);
+        let bench = on.bench().map_err(|error| error.to_string())?;
+        let mut player = Player { stage: on, bench, able: BTreeMap::new(), axes: BTreeMap::new() };
         player.group(file, group, most, failures);
         let Player { bench, .. } = player;
-        stage.keep(bench);
+        on.keep(bench);
         if failures.len() >= most {
             break;
         }
@@ -197,6 +204,7 @@ impl Player<'_> {
                 let able = known.or_insert_with(|| able(&stage.axes[axis], &stage.mapping));
                 outcome.written = able.as_ref().map(|able| made(able, *generic, *value)).unwrap_or_default();
             }
+            Done::Silence => outcome.told = self.bench.silence(axis),
             Done::Commissioned => {}
         }
         outcome.block = self.block_of(axis);

@@ -8,14 +8,15 @@ use profile_cia402::wire::NodeId;
 use profile_cia402::wire::pdo::mapped_len;
 use profile_generic::can::Id;
 
-use super::{Behind, RowCache, StageAxis, StageError};
+use super::{Behind, Held, RowCache, StageAxis, StageError};
 use crate::config::Config;
 use crate::engine::build::can::{described, network};
 use crate::engine::build::scaling;
 use crate::engine::bus::can::commissioner;
 use crate::engine::bus::can::layout::{AxisPdos, FoundPdos, Part};
 use crate::mapping::{
-    Cia402Axis, CipScaling, DriveIdentity, DriveProgram, Item, Mapping, ObjectFacts, ObjectStep, Plan,
+    Cia402Axis, Cia402Dictionary, CipScaling, DriveIdentity, DriveProgram, Item, Mapping, Object,
+    ObjectFacts, ObjectStep, Plan,
 };
 use crate::simulate::can_bus::InProcessCan;
 
@@ -97,6 +98,8 @@ struct CanMember {
     needs: Cia402Axis,
     /// The scaling of the controller.
     scaling: CipScaling,
+    /// What it holds in place of what its data sheet says.
+    held: Vec<(Object, Vec<u8>)>,
 }
 
 impl CanDrive {
@@ -149,6 +152,7 @@ impl CanDrive {
 }
 
 /// The axes of a CAN bus of a configuration, each with its number there. Simulated drives stand in for those of the machine.
+/// `held` is what they hold in place of their own.
 ///
 /// # Errors
 /// A simulated drive cannot be led as the configuration says.
@@ -156,6 +160,7 @@ pub(super) fn configured(
     config: &Config,
     bus: usize,
     mapping: &Mapping,
+    held: &[Held],
 ) -> Result<Vec<(usize, StageAxis)>, StageError> {
     let simulated = InProcessCan::of(&config.can[bus], None);
     let mut axes = Vec::new();
@@ -166,7 +171,14 @@ pub(super) fn configured(
             let failed = |told: String| StageError::Sheet { axis: axis.name.clone(), told };
             let sheet = eds::read(device.eds()).map_err(|error| failed(error.to_string()))?.description;
             let drive = config.can_drive(axis).map(|(_, drive)| drive.name.clone()).unwrap_or_default();
+            let own = held.iter().filter(|held| held.drive == drive);
+            let own = own.filter_map(|held| match held.item {
+                Item::Object(object) => Some((on_first_axis(object), held.bytes.clone())),
+                Item::Idn(_) | Item::Attribute(_) => None,
+            });
+            let held = own.collect();
             let member = CanMember {
+                held,
                 name: axis.name.clone(),
                 device: axis.device,
                 instance: axis.instance,
@@ -181,6 +193,11 @@ pub(super) fn configured(
         }
     }
     Ok(axes)
+}
+
+/// The object as the tables have it, whichever axis of its device it is.
+fn on_first_axis(object: Object) -> Object {
+    Object { index: Cia402Dictionary::on_first_axis(object.index), ..object }
 }
 
 /// An axis on the drive with this data sheet.
@@ -214,7 +231,7 @@ fn lead(
     let number = |sub| sheet.sub(0x1018, sub)?.setting()?.at(node.get())?.as_u32();
     let identity = DriveIdentity { vendor: number(1), product: number(2) };
     let mapping = mapping.family_of(&identity).map_or(mapping, |family| &family.mapping);
-    let facts = asked(mapping, identity, node.get(), needs, sheet)?;
+    let facts = asked(mapping, identity, member, sheet)?;
     let program = mapping.cia402_program(needs, &facts).map_err(|error| error.to_string())?;
     let telegram = &program.telegram;
     let both = commissioner::pdos(
@@ -250,15 +267,20 @@ fn lead(
 fn asked(
     mapping: &Mapping,
     identity: DriveIdentity,
-    node: u8,
-    needs: &Cia402Axis,
+    member: &CanMember,
     sheet: &DeviceDescription,
 ) -> Result<ObjectFacts, String> {
+    let (node, needs) = (member.node.get(), &member.needs);
     let mut facts = ObjectFacts::of(identity);
     for plan in [Plan::Ask, Plan::Tell] {
         for step in mapping.cia402_steps(plan, needs, &facts).map_err(|error| error.to_string())? {
             let (ObjectStep::Read { object, .. } | ObjectStep::Write { object, .. }) = step;
             let Some(Item::Object(there)) = step.item(needs) else { continue };
+            let instead = member.held.iter().find(|(known, _)| *known == object);
+            if let (Some((_, bytes)), ObjectStep::Read { .. }) = (instead, &step) {
+                facts.note_data(object, bytes);
+                continue;
+            }
             let held = sheet.sub(there.index, there.sub);
             match (held, step) {
                 (None, _) => facts.note_missing(object),

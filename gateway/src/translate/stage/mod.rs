@@ -116,10 +116,23 @@ impl StageAxis {
     }
 }
 
+/// A value that a drive holds in place of its own.
+#[derive(Debug, Clone)]
+pub(super) struct Held {
+    /// Name of the drive.
+    pub drive: String,
+    /// The IDN or object.
+    pub item: Item,
+    /// Its bytes, the least significant first.
+    pub bytes: Vec<u8>,
+}
+
 /// All axes of a configuration, and where each drive has its place in the telegrams.
 #[derive(Debug)]
 pub struct Stage {
     config: Config,
+    /// What the drives hold while they are commissioned, in place of their own.
+    held: Vec<Held>,
     /// Benches that nobody uses now.
     benches: Mutex<Vec<Box<Bench>>>,
     /// The tables.
@@ -170,12 +183,17 @@ impl Stage {
     /// # Errors
     /// The configuration makes no box, or a drive does not come to cyclic operation with it.
     pub fn rehearse(config: &Config, mapping: Mapping) -> Result<Self, StageError> {
-        let mut bench = Bench::new(config, mapping.clone())?;
+        Self::rehearse_holding(config, mapping, Vec::new())
+    }
+
+    /// The same with drives that hold other values while the box asks them, and so get other telegrams.
+    fn rehearse_holding(config: &Config, mapping: Mapping, held: Vec<Held>) -> Result<Self, StageError> {
+        let mut bench = Bench::new(config, mapping.clone(), &held)?;
         let told: Vec<String> = bench.take_notices().iter().map(ToString::to_string).collect();
         let engine = bench.engine();
         let mut axes = Vec::with_capacity(config.axes.len());
         for bus in 0..config.can.len() {
-            axes.extend(can::configured(config, bus, &mapping)?);
+            axes.extend(can::configured(config, bus, &mapping, &held)?);
         }
         for network in 0..config.devicenet.len() {
             axes.extend(devicenet::configured(config, network, &mapping)?);
@@ -227,7 +245,7 @@ impl Stage {
         let topology = |index: usize| u16::try_from(index + 1).unwrap_or(u16::MAX);
         let layout = engine.sercos().map(|bus| bus.master().layout().to_wire(topology)).unwrap_or_default();
         let (benches, labels) = (Mutex::new(vec![Box::new(bench)]), Mutex::default());
-        Ok(Self { config: config.clone(), axes, layout, mapping, benches, labels })
+        Ok(Self { config: config.clone(), held, axes, layout, mapping, benches, labels })
     }
 
     /// A bench with the programs of the stage, on which nothing was said yet.
@@ -235,7 +253,7 @@ impl Stage {
         let kept = self.benches.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut bench = match kept {
             Some(bench) => bench,
-            None => Box::new(Bench::new(&self.config, self.mapping.clone())?),
+            None => Box::new(Bench::new(&self.config, self.mapping.clone(), &self.held)?),
         };
         bench.restart(&self.axes);
         Ok(bench)
@@ -258,6 +276,7 @@ impl Stage {
     pub(super) fn with_axes(&self, axes: Vec<StageAxis>) -> Self {
         Self {
             config: self.config.clone(),
+            held: self.held.clone(),
             benches: Mutex::default(),
             mapping: self.mapping.clone(),
             axes,
@@ -291,6 +310,13 @@ impl Stage {
             .iter_mut()
             .for_each(|bench| bench.note_use());
         Ok(self)
+    }
+
+    /// Whether each value has the place in the telegrams that it has for these axes.
+    pub(super) fn has_telegrams_of(&self, axes: &[StageAxis]) -> bool {
+        let telegrams =
+            |axes: &[StageAxis]| -> Vec<_> { axes.iter().map(|axis| axis.south.telegram.clone()).collect() };
+        telegrams(&self.axes) == telegrams(axes)
     }
 
     /// An IDN or object with its name.

@@ -1,6 +1,6 @@
 //! What the drives of a machine hold, in place of what the simulated ones do.
 
-use super::{Behind, Stage, StageError};
+use super::{Behind, Held, Stage, StageError};
 use crate::mapping::{Cia402Dictionary, Item, Object};
 use crate::translate::{Line, LineError, ListError};
 
@@ -23,6 +23,26 @@ pub enum ValuesError {
     Stage(#[from] StageError),
 }
 
+/// The values of a list, with their lines.
+fn held(text: &str) -> Result<Vec<(usize, Held)>, ListError> {
+    let mut values = Vec::new();
+    for (line, content) in (1..).zip(text.lines()) {
+        let failed = |error| ListError { line, error };
+        match Line::parse(content).map_err(failed)? {
+            None => {}
+            Some(Line::Held { drive, item, bytes }) => {
+                values.push((line, Held { drive: drive.to_owned(), item, bytes }));
+            }
+            Some(_) => {
+                let message =
+                    "expected `idn DRIVE S-0-0076 BYTES` or `object DRIVE 608F:01 BYTES`".to_owned();
+                return Err(failed(LineError { column: 1, message }));
+            }
+        }
+    }
+    Ok(values)
+}
+
 impl Stage {
     /// The same axes with drives that hold other values: scaling, gear, feed constant and whatever else they tell of themselves.
     /// `text` is a list of `idn` and `object` lines, as lists of frames have them.
@@ -30,17 +50,7 @@ impl Stage {
     /// # Errors
     /// [`ValuesError`].
     pub fn with_values(mut self, text: &str) -> Result<Self, ValuesError> {
-        for (line, content) in (1..).zip(text.lines()) {
-            let failed = |error| ListError { line, error };
-            let (drive, item, bytes) = match Line::parse(content).map_err(failed)? {
-                None => continue,
-                Some(Line::Held { drive, item, bytes }) => (drive, item, bytes),
-                Some(_) => {
-                    let message =
-                        "expected `idn DRIVE S-0-0076 BYTES` or `object DRIVE 608F:01 BYTES`".to_owned();
-                    return Err(failed(LineError { column: 1, message }).into());
-                }
-            };
+        for (line, Held { drive, item, bytes }) in held(text)? {
             let known = self.axes.iter().map(|axis| axis.drive.clone()).collect::<Vec<_>>().join(", ");
             let axis = self.axes.iter_mut().find(|axis| axis.drive == drive);
             let Some(axis) = axis else {
@@ -69,6 +79,15 @@ impl Stage {
             axis.stands_in = false;
         }
         Ok(self.compiled_anew()?)
+    }
+
+    /// Drives that hold these values from the beginning, commissioned anew: with other modes a drive gets other telegrams.
+    ///
+    /// # Errors
+    /// [`ValuesError`].
+    pub(in super::super) fn rehearse_with(&self, text: &str) -> Result<Self, ValuesError> {
+        let held = held(text)?.into_iter().map(|(_, held)| held).collect();
+        Ok(Self::rehearse_holding(&self.config, self.mapping.clone(), held)?)
     }
 
     /// Drives whose scaling is that of a simulated one: neither does the box set it, nor has anybody said what it is.

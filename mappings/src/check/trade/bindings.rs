@@ -2,13 +2,13 @@
 
 use super::facts::{
     ATTRIBUTES, AXIS_STATUS, Binding, CIA402_CAPTURES, CIA402_PROBES, CIA402_PROBING, CIA402_SAMPLES, CYCLIC,
-    CaptureFact, EVENTS, MODE_SLOTS, OF_THE_DRIVE, OPPOSITES, PARAMETERS, PROCEDURES, SERCOS_CAPTURES,
-    SERCOS_PROBES, SERCOS_PROBING, SERCOS_STATUS, SIGNALS, Trigger, WORDS,
+    CaptureFact, EVENTS, MODE_SLOTS, OF_THE_DRIVE, OF_THE_SERCOS_DRIVE, OPPOSITES, PARAMETERS, PROCEDURES,
+    SERCOS_CAPTURES, SERCOS_PROBES, SERCOS_PROBING, SERCOS_STATUS, SIGNALS, Trigger, WORDS, WRAPPING,
 };
 use super::{Reporter, is_standard, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
-use crate::finding::registry::{DIRECTION, WRONG_BINDING, WRONG_STATE};
+use crate::finding::registry::{DIRECTION, WRONG_BINDING, WRONG_STATE, WRONG_WRAP};
 use crate::format::{FieldIs, FieldValueRow, Name};
 
 /// Which of the places of a binding.
@@ -91,7 +91,9 @@ fn bound(
     if right.is_empty() || right.contains(&given) || !is_standard(given) {
         return;
     }
-    let other = facts.iter().find(|fact| places(fact).contains(&given));
+    // A parameter is not read from what goes through the telegrams as another value, and no signal from a parameter.
+    let all = facts.iter().chain(SIGNALS).chain(WORDS).chain(PARAMETERS);
+    let other = all.into_iter().find(|fact| places(fact).contains(&given));
     if other.is_none() && !strict {
         return;
     }
@@ -109,6 +111,25 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().cip_generic;
     let mut reporter = Reporter { source: &file.text, findings };
     for row in &file.rows.cyclic {
+        let element = row.element.get_ref().as_str();
+        let wraps = WRAPPING.contains(&element);
+        if row.wraps != wraps && CYCLIC.iter().any(|(known, _)| *known == element) {
+            let what = match wraps {
+                true => [
+                    format!("`{element}` does not wrap"),
+                    "a position goes round at the end of its DINT and at the unwind position: an axis that turns \
+                     on would be led back all the way"
+                        .to_owned(),
+                    "write `wraps = true`".to_owned(),
+                ],
+                false => [
+                    format!("`{element}` wraps"),
+                    "it is no position: a value beyond its range is one that the controller wants".to_owned(),
+                    "remove `wraps`".to_owned(),
+                ],
+            };
+            reporter.report(WRONG_WRAP, ("element", row.element.span()), what);
+        }
         let known = CYCLIC.iter().find(|(element, _)| element == row.element.get_ref());
         let Some((element, signal)) = known.filter(|(_, signal)| signal != row.signal.get_ref()) else {
             continue;
@@ -324,7 +345,8 @@ pub(super) fn cia402_places(mapping: &Mapping, findings: &mut Findings) {
 /// A parameter is read, and what is the drive's is not written.
 fn direction(reporter: &mut Reporter<'_>, parameter: &Name, place: &Name, direction: &Name) {
     let name = parameter.get_ref().as_str();
-    let (given, own) = (direction.get_ref().as_str(), OF_THE_DRIVE.contains(&name));
+    let own = OF_THE_DRIVE.contains(&name) || OF_THE_SERCOS_DRIVE.contains(&place.get_ref().as_str());
+    let given = direction.get_ref().as_str();
     if !is_standard(place.get_ref()) || given == "from_drive" || given == "both" && !own {
         return;
     }

@@ -1,13 +1,14 @@
 //! A fault of a drive is reported as what it is.
 
 use super::facts::{
-    CIP_FAULTS, CLASSES, INHIBITS, OWN_EVENT_STATUS, OWN_FAULTS, OWN_INHIBITS, SERCOS_FAULTS,
+    CIP_FAULTS, CLASSES, CODES, INHIBITS, OWN_EVENT_STATUS, OWN_FAULTS, OWN_INHIBITS, SERCOS_FAULTS,
+    SERCOS_NUMBERS,
 };
 use super::{Reporter, place_of};
 use crate::Mapping;
 use crate::finding::registry::{WEAKER_REACTION, WRONG_FAULT};
 use crate::finding::{Findings, Spanned};
-use crate::format::{CipFaultRow, FieldIs, FieldValueRow, Name};
+use crate::format::{CipFaultRow, FieldIs, FieldValueRow, Name, SercosFaultRow};
 
 /// Causes without a name of their own: they say less than a bit or class, and nothing that is wrong.
 const NAMELESS: [&str; 2] = ["drive_specific", "drive_warning"];
@@ -122,6 +123,7 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
             ];
             reporter.report(WRONG_FAULT, ("cause", row.cause.span()), what);
         }
+        number(&mut reporter, row);
         // Several bits together, and values of fields, are what a vendor says with them.
         let [field] = row.pattern.as_slice() else { continue };
         let name = field.field.get_ref().as_str();
@@ -139,6 +141,41 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
     }
 }
 
+/// A row of the diagnostic number. Status codes, and what else a vendor says in it, are the vendor's.
+fn number(reporter: &mut Reporter<'_>, row: &SercosFaultRow) {
+    let cause = row.cause.get_ref().as_str();
+    if row.word.get_ref() != "Diagnostic number" {
+        return;
+    }
+    let has = |(field, is): &(&str, u32)| {
+        let known = |row: &FieldValueRow| {
+            row.field.get_ref() == field
+                && matches!(row.is.get_ref(), FieldIs::Number(number) if number == is)
+        };
+        row.pattern.iter().any(known)
+    };
+    let whole = |fields: &[(&str, u32)]| fields.len() == row.pattern.len() && fields.iter().all(has);
+    let by_cause = SERCOS_NUMBERS.iter().find(|(_, known)| *known == cause);
+    let by_fields = SERCOS_NUMBERS.iter().find(|(fields, _)| whole(fields));
+    let right = match (by_cause, by_fields) {
+        (_, Some((_, right))) if *right != cause => {
+            format!("expected `cause = \"{right}\"` for these fields")
+        }
+        (Some((fields, _)), None) => {
+            let fields: Vec<String> =
+                fields.iter().map(|(field, is)| format!("`{field}` = {is:#X}")).collect();
+            format!("expected {}", fields.join(", "))
+        }
+        _ => return,
+    };
+    let what = [
+        format!("`{cause}` would be reported for another number of S-0-0390"),
+        right,
+        "correct `pattern` or `cause`; codes of a vendor have causes of their own".to_owned(),
+    ];
+    reporter.report(WRONG_FAULT, ("cause", row.cause.span()), what);
+}
+
 /// The classes of error codes, and how hard a code is taken.
 pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_cia402;
@@ -153,6 +190,10 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     }
     for row in &file.rows.fault {
         silent(&mut reporter, &row.cause, row.reaction.as_ref());
+        for code in &row.codes {
+            let name = code.get_ref().as_str();
+            wrong(&mut reporter, &row.cause, name, CODES.iter().find(|(known, _)| *known == name));
+        }
         warns(&mut reporter, &row.codes, row.reaction.as_ref());
     }
 }

@@ -49,14 +49,18 @@ const HALT: u32 = 1 << 8;
 const RESET: u32 = 1 << 7;
 const QUICK_STOP: u32 = 1 << 2;
 
-/// Modes of operation: profile position, velocity of a frequency converter, profile velocity, interpolated position.
+/// Modes of operation: profile position, velocity of a frequency converter, profile velocity, interpolated position, homing.
 const PP: i8 = 1;
 const VL: i8 = 2;
 const PV: i8 = 3;
 const IP: i8 = 7;
 
-/// Modes of operation in which bit 12 says whether the drive follows command values: csp, csv, cst.
-const CYCLIC: std::ops::RangeInclusive<i8> = 8..=10;
+const HM: i8 = 6;
+
+/// Modes of operation in which bit 12 says whether the drive follows command values: csp, csv, cst, and ip.
+fn tells_by_bit_12(mode: i8) -> bool {
+    matches!(mode, IP | 8..=10)
+}
 
 fn state_of(word: u32) -> Option<(State, &'static str)> {
     let found = STATES.iter().find(|(_, _, mask, value)| word & mask == *value);
@@ -113,7 +117,7 @@ fn meant(state: State, word: u32, mode: i8, tells: Tells) -> Report {
         Disabled => Report::AwaitingPower,
         ReadyToSwitchOn if tells.voltage && word & VOLTAGE == 0 => Report::AwaitingPower,
         ReadyToSwitchOn | SwitchedOn => Report::Ready,
-        Enabled if tells.follows && CYCLIC.contains(&mode) && word & FOLLOWS == 0 => Report::Enabling,
+        Enabled if tells.follows && tells_by_bit_12(mode) && word & FOLLOWS == 0 => Report::Enabling,
         Enabled => Report::Operating,
         QuickStop => Report::Stopping,
         FaultReaction => Report::FaultReaction,
@@ -125,11 +129,11 @@ fn reports(mapping: &Mapping, reporter: &mut Reporter<'_>) {
     let rows = &mapping.tables().generic_cia402.rows;
     let rules = mapping.cia402.reports();
     let mut reported = vec![false; rules.len() + 1];
-    // Every value of the low bits, with and without bit 12; csp, and pp, where bit 12 is another one.
-    for case in 0..1_u32 << 11 {
+    // Every value of the low bits, with and without bit 12, in every mode.
+    let modes = || [PP, VL, PV, 4, HM, IP, 8, 9, 10];
+    for (case, mode) in (0..1_u32 << 10).flat_map(|case| modes().map(|mode| (case, mode))) {
         let word = case & 0x7F | if case & 0x80 != 0 { FOLLOWS } else { 0 };
-        let mode: i8 = if case & 0x100 != 0 { 8 } else { 1 };
-        let tells = Tells { follows: case & 0x200 != 0, voltage: case & 0x400 != 0 };
+        let tells = Tells { follows: case & 0x100 != 0, voltage: case & 0x200 != 0 };
         let Some((state, name)) = state_of(word) else { continue };
         let at = rules.iter().position(|rule| {
             rule.pattern.matches(word)
@@ -192,8 +196,9 @@ const STATUS: &[Shown] = &[
         "tracking",
         "the state Operation enabled, and bit 12 in csp, csv, cst and ip where the drive has it",
         |case| {
-            let told = matches!(case.mode, IP | 8..=10) && case.tells.follows;
-            Some(case.state == Enabled && (!told || case.word & FOLLOWS != 0))
+            let told = tells_by_bit_12(case.mode) && case.tells.follows;
+            // A drive that homes follows nobody.
+            Some(case.state == Enabled && case.mode != HM && (!told || case.word & FOLLOWS != 0))
         },
     ),
     ("target_reached", "bit 10 in pp and Operation enabled", |case| {
@@ -271,7 +276,7 @@ fn cases() -> Vec<Case> {
             let beside: u32 = (0..bits.len()).filter(|bit| is(*bit)).map(|bit| bits[bit]).sum();
             let tells = Tells { follows: is(bits.len()), voltage: is(bits.len() + 1) };
             let of_mode = |mode| Case { state: *state, word: value | beside, mode, tells };
-            cases.extend([PP, VL, PV, 4, IP, 8, 9, 10].map(of_mode));
+            cases.extend([PP, VL, PV, 4, HM, IP, 8, 9, 10].map(of_mode));
         }
     }
     cases

@@ -2,6 +2,8 @@
 //!
 //! They are stated here once and not read from the tables, so that a change of a table cannot change what it is compared with.
 
+use super::commissioning::{Step, When};
+
 /// A value of a SERCOS drive, and the bit by which the drive inverts it.
 pub(super) struct SercosSign {
     pub idn: &'static str,
@@ -209,6 +211,32 @@ pub(super) const UNITS: &[(&str, f64)] = &[
     ("Henries", 1e9),
     ("kg*m\u{b2}", 1e9),
     ("kg", 1e6),
+];
+
+/// What the units of the drives measure. A drive says by element 4 which one it uses: each may come, whether a shipped IDN has it or not.
+pub(super) const SERCOS_UNITS: &[(&str, &str)] = &[
+    ("ns", "time"),
+    ("us", "time"),
+    ("ms", "time"),
+    ("A", "current"),
+    ("V", "voltage"),
+    ("kW", "power"),
+    ("%", "fraction"),
+    ("1000/min", "gain"),
+    ("1/min", "velocity"),
+    ("Rev", "none"),
+    ("mm/Rev", "none"),
+    ("um/Rev", "none"),
+    ("inch/Rev", "none"),
+    ("degC", "temperature"),
+];
+pub(super) const CIA402_UNITS: &[(&str, &str)] = &[
+    ("ms", "time"),
+    ("us", "time"),
+    ("mA", "current"),
+    ("mV", "voltage"),
+    ("mNm", "torque_absolute"),
+    ("rpm", "velocity"),
 ];
 
 /// Displacement units of CIP by the end of their name, in nanounits.
@@ -490,6 +518,25 @@ pub(super) const CLASSES: &[(&str, &str)] = &[
     ("Device specific", "drive_specific"),
 ];
 
+/// Error codes of 603Fh whose names say more than their class and their exception. A current that is too high at the output is a short
+/// circuit or lasts too long; CIP Motion has one exception for both. That every memory is one cause is the product's own: CIP Motion has
+/// one fault of a memory (Table 5-2.72).
+pub(super) const CODES: &[(&str, &str)] = &[
+    ("Short circuit or earth leakage, motor side", "motor_short_circuit"),
+    ("Short circuit, motor side", "motor_short_circuit"),
+    ("Short circuit phases U-V", "motor_short_circuit"),
+    ("Short circuit phases V-W", "motor_short_circuit"),
+    ("Short circuit phases W-U", "motor_short_circuit"),
+    ("Continuous over-current", "motor_over_current"),
+    ("Continuous over-current 1", "motor_over_current"),
+    ("Continuous over-current 2", "motor_over_current"),
+    ("Hardware data storage", "memory"),
+    ("Working memory (RAM)", "memory"),
+    ("Program memory (EPROM)", "memory"),
+    ("Non-volatile data memory (EEPROM)", "memory"),
+    ("Data storage of additional modules", "memory"),
+];
+
 /// Axis Status bits of CIP Motion (Tables 5-2.60 and 5-2.61): the bit, and the generic bits and the mode that it shows, each
 /// line one way to come to it.
 pub(super) const AXIS_STATUS: &[(&str, &str, Option<&str>)] = &[
@@ -688,6 +735,50 @@ pub(super) const WRITES: &[(&str, &[i64])] = &[
     ("6007:00", &[3]),
 ];
 
+/// Which axes a step of commissioning is for, and its phase. What the gateway scales it writes in CP2, which all drives accept; what it
+/// scales depends on the axis: turns or a way, and whether positions wrap. Probes are set up for an axis that captures events. Parameters
+/// are written in CP3, when their units were read.
+pub(super) const SERCOS_STEPS_OF: &[Step] = &[
+    ("command", Some("S-0-0099"), None, 2, When::ALWAYS),
+    ("write", Some("S-0-0076"), Some(0x42), 2, When::TURNS_NOT),
+    ("write", Some("S-0-0076"), Some(0xC2), 2, When::TURNS),
+    ("write", Some("S-0-0076"), Some(0x41), 2, When::LINEAR),
+    ("write", Some("S-0-0079"), Some(3_600_000), 2, When::ROTARY),
+    ("write", Some("S-0-0103"), Some(1_843_200_000), 2, When::TURNS),
+    ("write", Some("S-0-0044"), Some(0x42), 2, When::ROTARY),
+    ("write", Some("S-0-0044"), Some(0x41), 2, When::LINEAR),
+    ("write", Some("S-0-0160"), Some(0x42), 2, When::ROTARY),
+    ("write", Some("S-0-0160"), Some(0x41), 2, When::LINEAR),
+    ("write", Some("S-0-0086"), Some(0), 2, When::SCALED),
+    ("write_modes", None, None, 2, When::ALWAYS),
+    ("read_scaling", None, None, 2, When::ALWAYS),
+    ("read", Some("S-0-0187"), None, 2, When::ALWAYS),
+    ("read", Some("S-0-0188"), None, 2, When::ALWAYS),
+    ("read_telegram", None, None, 2, When::ALWAYS),
+    ("read_parameters", None, None, 2, When::ALWAYS),
+    ("read_procedures", None, None, 2, When::ALWAYS),
+    ("read_captures", None, None, 2, When::CAPTURES),
+    ("write", Some("S-0-0169"), Some(0x3), 3, When::CAPTURES),
+    ("write", Some("S-0-0169"), Some(0xF), 3, When::CAPTURES),
+    ("write", None, None, 3, When::ALWAYS),
+    ("read", Some("S-0-0011"), None, 3, When::ALWAYS),
+];
+
+/// The modes of operation of which a drive must be led in one to be written this: how it interpolates matters in ip alone.
+pub(super) const CIA402_STEPS_OF: &[(&str, &[&str])] =
+    &[("60C0:00", &["ip"]), ("605C:00", &[]), ("605D:00", &[]), ("605A:00", &[]), ("6007:00", &[])];
+
+/// Errors of S-0-0390, by fields of the number: the communication profile (source type 3) with a standard code (interpretation 3), and
+/// any other of class F, which is a class 1 diagnostic.
+pub(super) const SERCOS_NUMBERS: &[(&[(&str, u32)], &str)] = &[
+    (&[("Class", 0xF), ("Interpretation", 3), ("Source type", 3)], "communication_loss"),
+    (&[("Class", 0xF)], "drive_specific"),
+];
+
+/// Cyclic elements that are positions: they go round at the end of a DINT (Tables 6-2.19 and 6-2.21), and at the unwind position
+/// (Table 5-2.12).
+pub(super) const WRAPPING: &[&str] = &["Command Position", "Actual Position"];
+
 /// Steps of commissioning without which an axis does not know its drive.
 pub(super) const SERCOS_STEPS: &[&str] = &[
     "command",
@@ -792,6 +883,9 @@ pub(super) const INHIBITS: &[(&str, &str)] = &[
     ("feedback_not_configured", "Feedback Not Configured"),
     ("commutation_not_configured", "Commutation Not Configured"),
 ];
+
+/// Motor data that a SERCOS drive keeps as it was set up; a CiA 402 drive takes the same limit at any time.
+pub(super) const OF_THE_SERCOS_DRIVE: &[&str] = &["S-0-0113"];
 
 /// Parameters that are the drive's: what it shows, and how motor and mechanics were set up in it.
 pub(super) const OF_THE_DRIVE: &[&str] = &[

@@ -7,15 +7,19 @@ use profile_sercos::wire::idn::Idn;
 
 use super::Reporter;
 use super::facts::{
-    AXIS_STATUS, Binding, CIA402_CAPTURES, CIA402_MODES, CIA402_READS, CIA402_STEPS, CIA402_WRITTEN, CLASSES,
-    CONTROL_MODES, CYCLIC, EVENTS, INHIBITS, IO_STATUS, MODE_SLOTS, OWN_EVENT_STATUS, OWN_INHIBITS,
-    PARAMETERS, PROCEDURES, SERCOS_CAPTURES, SERCOS_CODES, SERCOS_EDGES, SERCOS_FAULTS, SERCOS_READS,
-    SERCOS_STATUS, SERCOS_STEPS, SERCOS_WRITTEN, SPELLINGS, STOPPINGS, WRITES,
+    ATTRIBUTES, AXIS_STATUS, Binding, CIA402_CAPTURES, CIA402_MODES, CIA402_READS, CIA402_STEPS,
+    CIA402_UNITS, CIA402_WRITTEN, CLASSES, CODES, CONTROL_MODES, CYCLIC, EVENTS, INHIBITS, IO_STATUS,
+    MODE_SLOTS, OWN_EVENT_STATUS, OWN_INHIBITS, PARAMETERS, PROCEDURES, SERCOS_CAPTURES, SERCOS_CODES,
+    SERCOS_EDGES, SERCOS_FAULTS, SERCOS_NUMBERS, SERCOS_READS, SERCOS_STATUS, SERCOS_STEPS, SERCOS_UNITS,
+    SERCOS_WRITTEN, SIGNALS, SPELLINGS, STOPPINGS, WITHOUT_ENCODER, WRITES,
 };
 use crate::Mapping;
 use crate::finding::Findings;
 use crate::finding::registry::NOTHING_BOUND;
-use crate::format::{DisplacementUnitRow, FieldIs, FieldValueRow, Name};
+use crate::format::{
+    Cia402SignalRow, CipAttributeRow, DisplacementUnitRow, FieldIs, FieldValueRow, Name, SercosFaultRow,
+    UnitRow,
+};
 
 /// A table in which rows are missed, with the place that stands for it.
 struct Table<'a> {
@@ -75,6 +79,13 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
         if !rows.cyclic.iter().any(|row| is(&row.element, element)) {
             let why = "the value would be left out of every update";
             table.lacks("cyclic", &format!("`element = \"{element}\"`"), why);
+        }
+    }
+    for (attribute, value) in ATTRIBUTES {
+        let is_stored = |row: &&CipAttributeRow| is(&row.attribute, attribute) && row.served_by.is_some();
+        if rows.attribute.iter().any(|row| is_stored(&row)) {
+            let why = "what the controller sets would be stored, and never reach a drive";
+            table.lacks("attribute", &format!("`{value}` for `{attribute}`"), why);
         }
     }
     for (control, _) in CONTROL_MODES {
@@ -149,6 +160,17 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
             table.lacks("fault", &format!("the bit `{field}`"), &why);
         }
     }
+    for (fields, cause) in SERCOS_NUMBERS {
+        let of_fields = |row: &&SercosFaultRow| {
+            row.word.get_ref() == "Diagnostic number"
+                && row.pattern.len() == fields.len()
+                && is(&row.cause, cause)
+        };
+        if !rows.fault.iter().any(|row| of_fields(&row)) {
+            let why = "an error that the drive says by its number alone would come without its cause";
+            table.lacks("fault", &format!("`{cause}` for errors of S-0-0390"), why);
+        }
+    }
     for fact in SERCOS_CAPTURES {
         if !rows.capture.iter().any(|row| is(&row.capture, fact.capture) && is(&row.edge, fact.edge)) {
             capture(&mut table, fact.capture, fact.edge);
@@ -167,6 +189,12 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
         {
             let why = "a parameter of a drive that writes it so would be missing";
             table.lacks("unit", &format!("the spelling `{text}` of `{unit}`"), why);
+        }
+    }
+    units(&mut table, SERCOS_UNITS, &rows.unit);
+    for binding in SIGNALS.iter().filter(|binding| !binding.idns.is_empty()) {
+        if !rows.signal.iter().any(|row| is(&row.signal, binding.name)) {
+            signal(&mut table, binding.name, binding.idns);
         }
     }
     for (mode, by_drive, _) in SERCOS_CODES {
@@ -236,6 +264,23 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
             capture(&mut table, fact.capture, fact.edge);
         }
     }
+    units(&mut table, CIA402_UNITS, &rows.unit);
+    for binding in SIGNALS.iter().filter(|binding| !binding.objects.is_empty()) {
+        if !rows.signal.iter().any(|row| is(&row.signal, binding.name)) {
+            signal(&mut table, binding.name, binding.objects);
+        }
+    }
+    let (without_encoder, _) = WITHOUT_ENCODER;
+    let may_lack = |name: &str| {
+        let own = |row: &&Cia402SignalRow| {
+            is(&row.signal, name) && row.modes.iter().any(|mode| is(mode, without_encoder))
+        };
+        rows.signal.iter().any(|row| own(&row))
+    };
+    if !may_lack("position_actual") {
+        let what = format!("`position_actual` with `modes = [\"{without_encoder}\"]`");
+        table.lacks("signal", &what, "a frequency converter without an encoder could not be used");
+    }
     for (mode, by_drive, own) in CIA402_MODES {
         let rows_of = rows.mode.iter().filter(|row| is(&row.mode, mode));
         let named: Vec<&Name> = rows_of
@@ -254,6 +299,12 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
         if !rows.fault_class.iter().any(|row| row.classes.iter().any(|known| is(known, class))) {
             let why = format!("its codes without a row of their own would not be reported as `{cause}`");
             table.lacks("fault_class", &format!("the class `{class}`"), &why);
+        }
+    }
+    for (code, cause) in CODES {
+        if !rows.fault.iter().any(|row| row.codes.iter().any(|known| is(known, code))) {
+            let why = format!("it would be reported as its class, and not as `{cause}`");
+            table.lacks("fault", &format!("the code `{code}`"), &why);
         }
     }
     for status in ["limit_switches", "positive_limit_switch", "negative_limit_switch", "home_switch"] {
@@ -302,9 +353,23 @@ fn parameter(table: &mut Table<'_>, name: &str, places: &[&str]) {
     table.lacks("parameter", &format!("`parameter = \"{name}\"`"), &why);
 }
 
+fn signal(table: &mut Table<'_>, name: &str, places: &[&str]) {
+    let why = format!("drives have it in {}, and no telegram could carry it", places.join(" or "));
+    table.lacks("signal", &format!("`signal = \"{name}\"`"), &why);
+}
+
 fn capture(table: &mut Table<'_>, capture: &str, edge: &str) {
     let why = "the edge would never be told";
     table.lacks("capture", &format!("the {edge} edge of `{capture}`"), why);
+}
+
+fn units(table: &mut Table<'_>, facts: &[(&str, &str)], rows: &[UnitRow]) {
+    for (unit, quantity) in facts {
+        if !rows.iter().any(|row| is(&row.unit, unit)) {
+            let why = format!("a {quantity} that a drive gives in it would be missing");
+            table.lacks("unit", &format!("`unit = \"{unit}\"`"), &why);
+        }
+    }
 }
 
 fn steps(table: &mut Table<'_>, verbs: &[&str], has: impl Fn(&str) -> bool) {

@@ -11,6 +11,7 @@ mod bindings;
 mod causes;
 mod cia402_words;
 mod cip_words;
+mod commissioning;
 mod controller;
 mod facts;
 mod gaps;
@@ -43,6 +44,7 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     policies::sercos(mapping, findings);
     policies::cip(mapping, findings);
     modes::sercos(mapping, findings);
+    commissioning::sercos(mapping, findings);
     cip_words::check(mapping, findings);
     controller::check(mapping, findings);
     // What nobody binds may follow from what is bound to the wrong place. A family has what its drives have, and says no reasons.
@@ -64,6 +66,7 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     causes::cia402(mapping, findings);
     policies::cia402(mapping, findings);
     modes::cia402(mapping, findings);
+    commissioning::cia402(mapping, findings);
 }
 
 /// The place of a key that may be missing: its own, else that of what names the row.

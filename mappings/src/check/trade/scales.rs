@@ -5,7 +5,10 @@ use profile_generic::scaling::UnitKind;
 use profile_sercos::wire::idn::Idn;
 
 use super::super::axes::short;
-use super::facts::{DISPLACEMENTS, FACTORS, FEED, GEAR, INCH, METRE, SCALED_UNITS, SPELLINGS, TURN, UNITS};
+use super::facts::{
+    CIA402_UNITS, DISPLACEMENTS, FACTORS, FEED, GEAR, INCH, METRE, SCALED_UNITS, SERCOS_UNITS, SPELLINGS,
+    TURN, UNITS,
+};
 use super::{Reporter, is_standard, place_of};
 use crate::finding::Findings;
 use crate::finding::registry::{WRONG_SCALE, WRONG_SHAFT};
@@ -119,6 +122,7 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_sercos;
     let mut reporter = Reporter { source: &file.text, findings };
     units(&mut reporter, &file.rows.unit);
+    measures(&mut reporter, &file.rows.unit, SERCOS_UNITS);
     for row in &file.rows.unit {
         for text in &row.texts {
             let fact = SPELLINGS.iter().find(|(known, _)| *known == text.as_str());
@@ -286,6 +290,20 @@ fn units(reporter: &mut Reporter<'_>, rows: &[UnitRow]) {
     }
 }
 
+/// What each unit measures.
+fn measures(reporter: &mut Reporter<'_>, rows: &[UnitRow], facts: &[(&str, &str)]) {
+    for row in rows {
+        let fact = facts.iter().find(|(unit, _)| unit == row.unit.get_ref());
+        let Some((unit, right)) = fact.filter(|(_, right)| row.quantity.get_ref() != right) else { continue };
+        let what = [
+            format!("`{unit}` measures a {}", row.quantity.get_ref()),
+            format!("expected `{right}`"),
+            format!("write `quantity = \"{right}\"`"),
+        ];
+        reporter.report(WRONG_SCALE, ("quantity", row.quantity.span()), what);
+    }
+}
+
 /// A ratio as a number; no number where it is none.
 fn quotient(num: i64, den: i64) -> f64 {
     Ratio::new(num, den).map_or(f64::NAN, |ratio| ratio.to_f64(1))
@@ -358,6 +376,7 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_cia402;
     let mut reporter = Reporter { source: &file.text, findings };
     units(&mut reporter, &file.rows.unit);
+    measures(&mut reporter, &file.rows.unit, CIA402_UNITS);
     for row in &file.rows.scaling {
         let unit = row.unit.get_ref().as_str();
         for method in &row.methods {
