@@ -20,7 +20,6 @@ pub(super) const RULES: [Rule; 2] = [
     Rule { id: id::UPDATE_DELAY_LOW_LIMIT, default: 2, range: DELAY_LIMITS },
 ];
 
-#[expect(clippy::cast_lossless, reason = "`f64::from` is not const")]
 const DELAY_LIMITS: (f64, f64) = (0.0, MAX_EXTRAPOLATION as f64);
 
 /// Numbers of attributes, and the table of those that every device has.
