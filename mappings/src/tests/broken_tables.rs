@@ -53,8 +53,8 @@ const CASES: &[Case] = &[
     (
         "range of an attribute that is a text",
         |t| &mut t.cip_generic,
-        "{ attribute = \"Motor Catalog Number\", served_by = \"shadow\",",
-        "{ attribute = \"Motor Catalog Number\", served_by = \"shadow\", range = [0, 1],",
+        "{ attribute = \"Motor Catalog Number\", served_by = \"device\",",
+        "{ attribute = \"Motor Catalog Number\", served_by = \"device\", range = [0, 1],",
     ),
     ("unknown attribute", |t| &mut t.cip_generic, "attribute = \"Kpp\"", "attribute = \"Kpq\""),
     ("unit does not convert", |t| &mut t.cip_generic, "\"position_loop_gain\"", "\"power_loss_time\""),

@@ -479,8 +479,8 @@ const CASES: &[Case] = &[
     (
         "a limit that is stored and never reaches a drive",
         |t| &mut t.cip_generic,
-        "attribute = \"Torque Rate Limit\", parameter = \"torque_rate_limit\", missing = \"shadow\"",
-        "attribute = \"Torque Rate Limit\", served_by = \"shadow\"",
+        "attribute = \"Torque Rate Limit\", parameter = \"torque_rate_limit\"",
+        "attribute = \"Torque Rate Limit\", served_by = \"device\"",
         code::NOTHING_BOUND,
         "mapping",
     ),
