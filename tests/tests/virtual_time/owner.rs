@@ -17,28 +17,28 @@ const MULTIPLE_SERVICE_PACKET: u8 = 0x0A;
 const MESSAGE_ROUTER: [u8; 4] = [0x20, 0x02, 0x24, 0x01];
 const PRIVILEGE_VIOLATION: u8 = 0x0F;
 
-/// Ramp Velocity - Positive, which may be set while the axis is Running.
-const RAMP_VELOCITY: u16 = 374;
+/// Position Lock Tolerance, which may be set while the axis is Running. Thousands of counts are whole counts of the drive.
+const LOCK_TOLERANCE: u16 = 443;
 const AXIS_STATE: u16 = 650;
 
 fn set(client: Client, rig: &mut Rig, value: f32) -> u8 {
-    client.ask(rig, SET, 1, Some(RAMP_VELOCITY), &value.to_le_bytes()).0
+    client.ask(rig, SET, 1, Some(LOCK_TOLERANCE), &(value * 1_000.0).to_le_bytes()).0
 }
 
 fn value(client: Client, rig: &mut Rig) -> f32 {
-    let (status, data) = client.ask(rig, GET, 1, Some(RAMP_VELOCITY), &[]);
+    let (status, data) = client.ask(rig, GET, 1, Some(LOCK_TOLERANCE), &[]);
     assert_eq!(status, 0);
-    f32::from_le_bytes(data.try_into().expect("a REAL"))
+    f32::from_le_bytes(data.try_into().expect("a REAL")) / 1_000.0
 }
 
-/// A Get of the axis state and a Set of the ramp in one packet; returns the statuses of both.
+/// A Get of the axis state and a Set of the tolerance in one packet; returns the statuses of both.
 fn both_in_one(client: Client, rig: &mut Rig) -> [u8; 2] {
     let attribute = |service: u8, id: u16, data: &[u8]| {
         let [low, high] = id.to_le_bytes();
         [&[service, 4, 0x20, 0x42, 0x24, 1, 0x31, 0, low, high], data].concat()
     };
     let first = attribute(GET, AXIS_STATE, &[]);
-    let second = attribute(SET, RAMP_VELOCITY, &9.0_f32.to_le_bytes());
+    let second = attribute(SET, LOCK_TOLERANCE, &9_000.0_f32.to_le_bytes());
     let at = 6 + u8::try_from(first.len()).expect("short");
     let data = [&[2, 0, 6, 0, at, 0], &first[..], &second[..]].concat();
     let (_, reply) = client.request(rig, MULTIPLE_SERVICE_PACKET, &MESSAGE_ROUTER, &data);
