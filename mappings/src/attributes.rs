@@ -297,7 +297,9 @@ impl AttributeEntry {
     pub fn agree(&self, a: &[u8], b: &[u8]) -> bool {
         match (self.number(a), self.number(b)) {
             (Some(Number::Real(a)), Some(Number::Real(b))) => (a - b).abs() <= a.abs().max(b.abs()) * SAME,
-            (a, b) => a == b,
+            (Some(a), Some(b)) => a == b,
+            // What is no number is not compared.
+            _ => false,
         }
     }
 

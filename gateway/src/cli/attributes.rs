@@ -6,12 +6,9 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
-use super::{AttributesArguments, CliError, print, translate};
+use super::{AttributesArguments, CliError, print, translate, usage};
 use crate::config::Config;
 use crate::mapping::{AttributeTruth, Truth};
-
-/// Exit status of a wrong command line, as clap has it.
-const USAGE: u8 = 2;
 
 /// What is printed of one axis as JSON.
 #[derive(Debug, Serialize)]
@@ -52,8 +49,7 @@ pub fn run(arguments: &AttributesArguments) -> Result<ExitCode, CliError> {
     let axes: Vec<_> = stage.axes.iter().filter(|axis| wanted(&axis.name)).collect();
     if let (Some(name), []) = (&arguments.axis, axes.as_slice()) {
         let names: Vec<_> = stage.axes.iter().map(|axis| axis.name.as_str()).collect();
-        eprintln!("error: there is no axis `{name}`; expected one of: {}", names.join(", "));
-        return Ok(ExitCode::from(USAGE));
+        return Ok(usage(&format!("there is no axis `{name}`; expected one of: {}", names.join(", "))));
     }
     let truths: Vec<_> =
         axes.iter().map(|axis| stage.mapping.truths(&axis.attributes, &axis.south)).collect();

@@ -4,15 +4,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use super::{CheckArguments, CheckFormat, CliError, has_colours, print};
+use super::{CheckArguments, CheckFormat, CliError, has_colours, print, usage};
 use crate::check::{Outcome, Request, check, schema};
 use crate::finding::registry::{self, Code, REGISTRY};
 use crate::finding::{Finding, Findings, Severity, json_report, sarif_report};
 use crate::mapping::check::{diff, page};
 use crate::mapping::{Mapping, TableTexts};
-
-/// Exit status of a wrong command line, as clap has it.
-const USAGE: u8 = 2;
 
 /// Checks, or reports the codes.
 ///
@@ -22,10 +19,7 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     if let Some(text) = &arguments.explain {
         return match Code::parse(text) {
             Some(code) => print(format!("{}\n", code.entry()), ExitCode::SUCCESS),
-            None => {
-                eprintln!("error: {}", unknown(text));
-                Ok(ExitCode::from(USAGE))
-            }
+            None => Ok(usage(&unknown(text))),
         };
     }
     if let Some(name) = &arguments.schema {
@@ -36,8 +30,7 @@ pub fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
         return print(list(format), ExitCode::SUCCESS);
     }
     if format == CheckFormat::Markdown || format == CheckFormat::Sarif && arguments.diff.is_some() {
-        eprintln!("error: --format markdown is for --list, and --format sarif for findings");
-        return Ok(ExitCode::from(USAGE));
+        return Ok(usage("--format markdown is for --list, and --format sarif for findings"));
     }
     let outcome = check(&Request {
         config: arguments.config.as_deref(),
@@ -118,8 +111,7 @@ fn schema(name: &str) -> Result<ExitCode, CliError> {
         Some(schema) => print(format!("{schema:#}\n"), ExitCode::SUCCESS),
         None => {
             let names: Vec<&str> = schema::names().collect();
-            eprintln!("error: there is no schema `{name}`: expected one of {}", names.join(", "));
-            Ok(ExitCode::from(USAGE))
+            Ok(usage(&format!("there is no schema `{name}`: expected one of {}", names.join(", "))))
         }
     }
 }

@@ -2,12 +2,9 @@
 
 use std::process::ExitCode;
 
-use super::{CliError, EdsArguments, print};
+use super::{CliError, EdsArguments, print, usage};
 use crate::config::Config;
 use crate::engine::build::{Host, adapter_config};
-
-/// Exit status of a wrong command line, as clap has it.
-const USAGE: u8 = 2;
 
 /// What is not in a sheet, and so does not matter.
 const NO_HOST: Host = Host { mac: [0; 6], incarnation: 1 };
@@ -45,11 +42,6 @@ pub fn run(arguments: &EdsArguments) -> Result<ExitCode, CliError> {
         println!("{}", path.display());
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn usage(message: &str) -> ExitCode {
-    eprintln!("error: {message}");
-    ExitCode::from(USAGE)
 }
 
 fn names(config: &Config) -> String {

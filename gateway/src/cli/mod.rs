@@ -645,6 +645,15 @@ pub fn main() -> ExitCode {
 /// An error as the person at the terminal reads it.
 type CliError = Box<dyn std::error::Error + Send + Sync>;
 
+/// Exit status of a wrong command line, as clap has it.
+const USAGE: u8 = 2;
+
+/// Says what is wrong with the command line.
+fn usage(message: &str) -> ExitCode {
+    eprintln!("error: {message}");
+    ExitCode::from(USAGE)
+}
+
 /// Whether output has colours: on a terminal, unless the person there wants none.
 fn has_colours(stream: &impl IsTerminal) -> bool {
     stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())

@@ -14,13 +14,10 @@ use serde::Serialize;
 
 use super::progress::Progress;
 use super::simulate::controller_time;
-use super::{CliError, ControllerArguments, signal};
+use super::{CliError, ControllerArguments, USAGE, signal};
 use crate::mapping::Mapping;
 use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::script::{Script, show_attribute};
-
-/// Exit status for a script or arguments that are wrong.
-const USAGE: u8 = 2;
 
 /// Runs or checks a script.
 pub fn run(arguments: &ControllerArguments, path: &Path) -> Result<ExitCode, CliError> {

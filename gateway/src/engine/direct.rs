@@ -74,6 +74,20 @@ pub struct DirectRequest {
     pub data: Vec<u8>,
 }
 
+/// What a bus is asked for.
+#[derive(Debug)]
+pub struct DirectTask {
+    /// What is accessed.
+    pub target: Target,
+    /// Whether it is written.
+    pub write: bool,
+    /// What is written, or the place for what is read.
+    pub data: Vec<u8>,
+}
+
+/// Why a bus has not begun with it, and the buffer.
+pub type NotBegun = (DirectFailure, Vec<u8>);
+
 /// Its result.
 #[derive(Debug, PartialEq, Eq)]
 pub struct DirectAnswer {
@@ -246,7 +260,10 @@ impl DirectNorth {
         let axis = usize::from(axis);
         let begun = match refusal(axis, direction, axes, ending, buses) {
             Some(failure) => Err((failure, data)),
-            None => buses.begin_direct(axis, target, direction != Direction::Read, data),
+            None => {
+                let write = direction != Direction::Read;
+                buses.begin_direct(axis, DirectTask { target, write, data })
+            }
         };
         match begun {
             Ok(()) => {

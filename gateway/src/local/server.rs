@@ -390,9 +390,8 @@ impl Client {
     /// Calls with what is known of the drive of an axis.
     fn with_context<T>(&self, axis: usize, with: impl FnOnce(&Context<'_>) -> T) -> T {
         let Shared { names, parameters, catalogue, .. } = &*self.shared;
-        let named = protocol::parameter_lines(parameters);
         let axis_name = names.get(axis).map_or("-", String::as_str);
-        with(&Context { axis: axis_name, bus: catalogue.bus(axis), catalogue, named: &named })
+        with(&Context { axis: axis_name, bus: catalogue.bus(axis), catalogue, parameters })
     }
 
     fn reply(&self, Accepted { axis, what }: &Accepted, answer: &Answer) -> String {

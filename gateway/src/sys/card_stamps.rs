@@ -61,18 +61,19 @@ pub struct StampsMissing {
 pub struct CardStamps {
     clock: Phc,
     path: PathBuf,
-    missing: Missing,
+    sent: Missing,
+    received: Missing,
 }
 
-/// Stamps missing in a row.
-#[derive(Debug, Default)]
+/// Stamps missing in a row, of one direction.
+#[derive(Debug)]
 struct Missing {
-    sent: Cell<u8>,
-    received: Cell<u8>,
+    direction: &'static str,
+    count: Cell<u8>,
 }
 
 impl CardStamps {
-    /// Has the card of an interface stamp PTP, and a socket tell its stamps.
+    /// Has the card of an interface stamp PTP, and a socket report its stamps.
     ///
     /// # Errors
     /// [`NotUsed`]; the card is as it was.
@@ -92,7 +93,7 @@ impl CardStamps {
             | libc::SOF_TIMESTAMPING_RAW_HARDWARE
             | libc::SOF_TIMESTAMPING_OPT_TSONLY;
         set_option(socket, libc::SOL_SOCKET, libc::SO_TIMESTAMPING, &flags).map_err(refused)?;
-        Ok(Self { clock, path, missing: Missing::default() })
+        Ok(Self { clock, path, sent: Missing::of("were sent"), received: Missing::of("came") })
     }
 
     /// The device of its clock.
@@ -106,8 +107,8 @@ impl CardStamps {
     /// # Errors
     /// Too many have had none.
     pub fn received(&self, stamp: Option<u64>) -> Result<Option<MonotonicTime>, StampsMissing> {
-        self.missing.count(&self.missing.received, stamp, "came")?;
-        Ok(stamp.and_then(|stamp| instant(stamp, self.clock.read()?)))
+        self.received.note(stamp)?;
+        Ok(self.at(stamp))
     }
 
     /// When a message that was sent passed the cable.
@@ -115,15 +116,23 @@ impl CardStamps {
     /// # Errors
     /// Too many have had no stamp.
     pub fn sent(&self, stamp: Option<u64>) -> Result<Option<MonotonicTime>, StampsMissing> {
-        self.missing.count(&self.missing.sent, stamp, "were sent")?;
-        Ok(stamp.and_then(|stamp| instant(stamp, self.clock.read()?)))
+        self.sent.note(stamp)?;
+        Ok(self.at(stamp))
+    }
+
+    fn at(&self, stamp: Option<u64>) -> Option<MonotonicTime> {
+        instant(stamp?, self.clock.read()?)
     }
 }
 
 impl Missing {
-    fn count(&self, of: &Cell<u8>, stamp: Option<u64>, direction: &'static str) -> Result<(), StampsMissing> {
-        of.set(if stamp.is_some() { 0 } else { of.get().saturating_add(1) });
-        if of.get() < MISSING_MAX { Ok(()) } else { Err(StampsMissing { direction }) }
+    fn of(direction: &'static str) -> Self {
+        Self { direction, count: Cell::new(0) }
+    }
+
+    fn note(&self, stamp: Option<u64>) -> Result<(), StampsMissing> {
+        self.count.set(if stamp.is_some() { 0 } else { self.count.get().saturating_add(1) });
+        if self.count.get() < MISSING_MAX { Ok(()) } else { Err(StampsMissing { direction: self.direction }) }
     }
 }
 
@@ -177,9 +186,8 @@ mod tests {
 
     #[test]
     fn eight_stamps_missing_in_a_row_of_one_direction_are_a_failure() {
-        let missing = Missing::default();
-        let sent = |stamp| missing.count(&missing.sent, stamp, "were sent");
-        let received = |stamp| missing.count(&missing.received, stamp, "came");
+        let (sent, received) = (Missing::of("were sent"), Missing::of("came"));
+        let (sent, received) = (|stamp| sent.note(stamp), |stamp| received.note(stamp));
         for _ in 0..7 {
             assert_eq!(sent(None), Ok(()));
             assert_eq!(received(Some(1)), Ok(()));

@@ -258,7 +258,7 @@ impl FollowerPort {
     }
 
     /// Says who stamps.
-    fn tell(&self, sockets: &PtpSockets) {
+    fn report(&self, sockets: &PtpSockets) {
         let interface = &self.interface;
         match sockets.card() {
             Ok(card) => {
@@ -291,7 +291,7 @@ fn run_follower(
         let opened = sockets.take().map_or_else(|| port.open(), Ok);
         let failure = match opened {
             Ok(sockets) => {
-                port.tell(&sockets);
+                port.report(&sockets);
                 let mut wire = HostWire { sockets, domain: config.domain, control: Arc::clone(control) };
                 let followed = catch_unwind(AssertUnwindSafe(|| {
                     follow(&config, &mut wire, &mut |status| reporter.report(status))

@@ -72,7 +72,7 @@ impl Bench {
             axis: AXES[axis],
             bus: self.catalogue.bus(axis),
             catalogue: &self.catalogue,
-            named: "",
+            parameters: &[],
         };
         let (mut job, mut step) = match Job::begin(ask, &context) {
             Ok(begun) => begun,

@@ -9,12 +9,9 @@ mod sheet;
 use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 
-use super::{CliError, DictionaryArguments, DictionaryFormat, DictionaryPart, DictionaryProfile};
+use super::{CliError, DictionaryArguments, DictionaryFormat, DictionaryPart, DictionaryProfile, usage};
 use crate::mapping::{Dictionaries, IdnPart, Mapping};
 use sheet::Sheet;
-
-/// Exit status of a wrong command line, as clap has it.
-const USAGE: u8 = 2;
 
 /// Prints to standard output.
 ///
@@ -32,10 +29,7 @@ fn print(arguments: &DictionaryArguments, out: &mut dyn Write) -> Result<ExitCod
     let mapping = mapping.map_err(|errors| errors.to_string())?;
     let sheet = match sheet(&mapping.dictionaries, arguments.profile, arguments.part) {
         Ok(sheet) => sheet,
-        Err(message) => {
-            eprintln!("error: {message}");
-            return Ok(ExitCode::from(USAGE));
-        }
+        Err(message) => return Ok(usage(&message)),
     };
     let written = match arguments.format {
         DictionaryFormat::Csv => sheet.write_csv(&mut *out),

@@ -83,6 +83,17 @@ pub fn run(arguments: &RestoreArguments) -> Result<ExitCode, CliError> {
 impl<'b> Restore<'b> {
     fn run(&mut self, drive: &mut Drive, backup: &'b Backup) -> Result<(), CliError> {
         let mut progress = Progress::new(false);
+        let ended = self.passes(drive, backup, &mut progress);
+        progress.clear();
+        ended
+    }
+
+    fn passes(
+        &mut self,
+        drive: &mut Drive,
+        backup: &'b Backup,
+        progress: &mut Progress,
+    ) -> Result<(), CliError> {
         let mut open: Vec<&Kept> = backup.parameter.iter().collect();
         let count = open.len();
         for pass in 1..=PASSES_MAX {
@@ -90,19 +101,12 @@ impl<'b> Restore<'b> {
             self.refused.clear();
             for (number, kept) in open.iter().enumerate() {
                 progress.at(|| format!("pass {pass}, {} of {count}: {}", number + 1, kept.id));
-                match self.restore(drive, kept) {
-                    Ok(None) => {}
-                    Ok(Some(refused)) if refused.ends_all() => {
-                        progress.clear();
-                        return Err(refused.text.into());
-                    }
-                    Ok(Some(refused)) => {
+                match self.restore(drive, kept)? {
+                    None => {}
+                    Some(refused) if refused.ends_all() => return Err(refused.text.into()),
+                    Some(refused) => {
                         self.refused.push((kept, refused.text));
                         left.push(*kept);
-                    }
-                    Err(error) => {
-                        progress.clear();
-                        return Err(error);
                     }
                 }
             }
@@ -111,7 +115,6 @@ impl<'b> Restore<'b> {
             }
             open = left;
         }
-        progress.clear();
         Ok(())
     }
 

@@ -148,13 +148,11 @@ impl SetPoints {
     /// Fine interpolation for updates like these, in the way the last one asked for.
     pub fn keep_updates(&mut self, updates: Updates, feedback: &AxisFeedback) {
         let Updates { period, may_miss, first } = updates;
-        let present = self.interpolator.as_mut();
-        if let Some(present) = present.filter(|present| present.config().period == period) {
-            present.set_extrapolation(may_miss);
-            return;
-        }
-        let present = self.interpolator.as_ref().map(FineInterpolator::config);
-        let target_update = present.map_or(first, |config| config.target_update);
+        let target_update = match &mut self.interpolator {
+            Some(present) if present.config().period == period => return present.set_extrapolation(may_miss),
+            Some(present) => present.config().target_update,
+            None => first,
+        };
         self.interpolator = FineInterpolator::new(InterpolatorConfig {
             target_update,
             period,

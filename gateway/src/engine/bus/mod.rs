@@ -21,7 +21,7 @@ use super::axis::AxisChannel;
 use super::axis::capture::CaptureAccess;
 use super::axis::procedure::ProcedureAccess;
 use super::cyclic::Received;
-use super::direct::{DirectFailure, DirectResult, Target};
+use super::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
 use super::notice::Notice;
 use super::port::SouthPort;
 use crate::mapping::{Item, Mapping};
@@ -156,17 +156,11 @@ pub trait South {
     /// Starts an access to the drive of an axis. Returns `false` if there is no drive or too many accesses wait.
     fn access(&mut self, axis: usize, access: &Access, purpose: Purpose) -> bool;
 
-    /// Starts a direct access to the drive of an axis, one of the bus at a time. `data` is written, or the place for what is read.
+    /// Starts a direct access to the drive of an axis, one of the bus at a time.
     ///
     /// # Errors
     /// Why not, and the buffer.
-    fn begin_direct(
-        &mut self,
-        axis: usize,
-        target: Target,
-        write: bool,
-        data: Vec<u8>,
-    ) -> Result<(), (DirectFailure, Vec<u8>)>;
+    fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun>;
 
     /// Takes the result of the direct access, once there is one.
     fn take_direct(&mut self) -> Option<DirectResult>;
@@ -345,17 +339,11 @@ impl Buses {
     ///
     /// # Errors
     /// Why not, and the buffer.
-    pub fn begin_direct(
-        &mut self,
-        axis: usize,
-        target: Target,
-        write: bool,
-        data: Vec<u8>,
-    ) -> Result<(), (DirectFailure, Vec<u8>)> {
+    pub fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {
         let place = self.of.get(axis).copied();
         match place.and_then(|place| self.list.get_mut(place)) {
-            Some(bus) => bus.get_mut().begin_direct(axis, target, write, data),
-            None => Err((DirectFailure::NoAxis, data)),
+            Some(bus) => bus.get_mut().begin_direct(axis, task),
+            None => Err((DirectFailure::NoAxis, task.data)),
         }
     }
 

@@ -91,7 +91,7 @@ impl Accesses {
             match (&access.operation, parameter.is_of_vendor()) {
                 // The drive lets the parameter only be read: it can be set to what the drive has.
                 (AccessOperation::Write(bytes), false) => {
-                    return self.confirm(on, access, bytes, held, buses);
+                    return self.begin_confirmation(on, access, bytes, held, buses);
                 }
                 (AccessOperation::Write(_), true) => return Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE),
                 (AccessOperation::Read(_), _) => {}
@@ -106,8 +106,8 @@ impl Accesses {
         Ok(())
     }
 
-    /// Compares a value with that of the drive, which lets it only be read.
-    fn confirm(
+    /// Asks the drive for a value that it lets only be read, to compare it with what the controller sets.
+    fn begin_confirmation(
         &mut self,
         on: &mut Accessed<'_>,
         access: &AttributeAccess,

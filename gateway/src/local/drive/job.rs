@@ -17,6 +17,7 @@ use super::id::Id;
 use super::known::{Bus, Catalogue, belongs_to_gateway, rescales};
 use super::value::{Kind, hex};
 use crate::engine::direct::{DATA_MAX, DirectAnswer, DirectFailure, Direction, Target};
+use crate::local::protocol::{NamedParameter, parameter_lines};
 
 /// Longest name, unit or limit that is shown, bytes.
 const ELEMENT_MAX: usize = 1_024;
@@ -123,8 +124,8 @@ pub struct Context<'a> {
     pub bus: &'a Bus,
     /// All drives.
     pub catalogue: &'a Catalogue,
-    /// Lines for the parameters that have names of their own.
-    pub named: &'a str,
+    /// Parameters that have names of their own.
+    pub parameters: &'a [NamedParameter],
 }
 
 /// What the drive was asked last.
@@ -384,7 +385,7 @@ fn error(ask: &Ask, context: &Context<'_>, code: &str, text: &str) -> String {
 
 /// The reply to `list` from a list of IDNs.
 fn list_of_drive(idns: impl Iterator<Item = Idn>, backup: bool, context: &Context<'_>) -> String {
-    let mut text = if backup { String::new() } else { context.named.to_owned() };
+    let mut text = if backup { String::new() } else { parameter_lines(context.parameters) };
     let mut count = text.lines().count();
     for idn in idns {
         count += 1;
@@ -399,7 +400,7 @@ fn list_of_drive(idns: impl Iterator<Item = Idn>, backup: bool, context: &Contex
 
 /// The reply to `list` from what is known without the drive.
 fn list_without_drive(backup: bool, context: &Context<'_>) -> String {
-    let mut text = if backup { String::new() } else { context.named.to_owned() };
+    let mut text = if backup { String::new() } else { parameter_lines(context.parameters) };
     let mut count = text.lines().count();
     let Bus::Can { source, objects } = context.bus else {
         let _ = writeln!(text, "{}", end_of_list(count, "overlays", context));
@@ -437,6 +438,8 @@ mod tests {
     use profile_sercos::wire::svc_error::SvcError;
 
     use super::*;
+    use profile_generic::parameter::{Access, Parameter};
+
     use crate::mapping::Mapping;
 
     /// An answer of the engine: the result and the buffer.
@@ -445,12 +448,14 @@ mod tests {
     /// A job for a SERCOS drive, and what comes of these answers.
     fn steps(ask: Ask, answers: Vec<Said>) -> (Vec<Target>, String) {
         let catalogue = Catalogue::new(vec![Bus::Sercos], &Mapping::embedded().unwrap());
-        let context = Context {
-            axis: "x",
-            bus: &Bus::Sercos,
-            catalogue: &catalogue,
-            named: "parameter notch access=read\n",
+        let notch = NamedParameter {
+            name: "notch".to_owned(),
+            parameter: Parameter(Parameter::FIRST_OF_VENDOR),
+            unit: "",
+            access: Access::Read,
+            range: None,
         };
+        let context = Context { axis: "x", bus: &Bus::Sercos, catalogue: &catalogue, parameters: &[notch] };
         let mut targets = Vec::new();
         let (mut job, mut step) = match Job::begin(ask, &context) {
             Ok(begun) => begun,

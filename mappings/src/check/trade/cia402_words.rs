@@ -58,7 +58,7 @@ const IP: i8 = 7;
 const HM: i8 = 6;
 
 /// Modes of operation in which bit 12 says whether the drive follows command values: csp, csv, cst, and ip.
-fn tells_by_bit_12(mode: i8) -> bool {
+fn reports_by_bit_12(mode: i8) -> bool {
     matches!(mode, IP | 8..=10)
 }
 
@@ -117,7 +117,7 @@ fn meant(state: State, word: u32, mode: i8, tells: Tells) -> Report {
         Disabled => Report::AwaitingPower,
         ReadyToSwitchOn if tells.voltage && word & VOLTAGE == 0 => Report::AwaitingPower,
         ReadyToSwitchOn | SwitchedOn => Report::Ready,
-        Enabled if tells.follows && tells_by_bit_12(mode) && word & FOLLOWS == 0 => Report::Enabling,
+        Enabled if tells.follows && reports_by_bit_12(mode) && word & FOLLOWS == 0 => Report::Enabling,
         Enabled => Report::Operating,
         QuickStop => Report::Stopping,
         FaultReaction => Report::FaultReaction,
@@ -196,7 +196,7 @@ const STATUS: &[Shown] = &[
         "tracking",
         "the state Operation enabled, and bit 12 in csp, csv, cst and ip where the drive has it",
         |case| {
-            let told = tells_by_bit_12(case.mode) && case.tells.follows;
+            let told = reports_by_bit_12(case.mode) && case.tells.follows;
             // A drive that homes follows nobody.
             Some(case.state == Enabled && case.mode != HM && (!told || case.word & FOLLOWS != 0))
         },

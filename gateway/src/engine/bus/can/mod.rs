@@ -38,7 +38,7 @@ use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
-use crate::engine::direct::{DirectFailure, DirectResult, Target};
+use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::{DriveIdentity, Item, Mapping};
@@ -614,13 +614,8 @@ impl South for CanBus {
         drive.accesses.submit(access.item, purpose, || master.sdo_submit(node, request, priority).ok())
     }
 
-    fn begin_direct(
-        &mut self,
-        axis: usize,
-        target: Target,
-        write: bool,
-        data: Vec<u8>,
-    ) -> Result<(), (DirectFailure, Vec<u8>)> {
+    fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {
+        let DirectTask { target, write, data } = task;
         let Target::Object(object) = target else { return Err((DirectFailure::OtherBus, data)) };
         let place = self.places.of(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
         let Some((device, _)) = place else { return Err((DirectFailure::NoDrive, data)) };

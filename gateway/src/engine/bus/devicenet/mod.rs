@@ -31,7 +31,7 @@ use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
-use crate::engine::direct::{DirectFailure, DirectResult, Target};
+use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::devicenet::ROW_LEN;
@@ -516,13 +516,8 @@ impl South for DevicenetBus {
         drive.accesses.submit(access.item, purpose, || master.submit(mac, request).ok())
     }
 
-    fn begin_direct(
-        &mut self,
-        axis: usize,
-        target: Target,
-        write: bool,
-        data: Vec<u8>,
-    ) -> Result<(), (DirectFailure, Vec<u8>)> {
+    fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {
+        let DirectTask { target, write, data } = task;
         let Target::Attribute { class, instance, attribute } = target else {
             return Err((DirectFailure::OtherBus, data));
         };

@@ -36,7 +36,7 @@ use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
-use crate::engine::direct::{DirectFailure, DirectResult, Target};
+use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
 use crate::mapping::{DriveFacts, DriveProgram, Full, Item, Mapping, SercosAxis, SercosError};
@@ -709,13 +709,8 @@ impl South for SercosBus {
         drive.accesses.submit(access.item, purpose, || master.svc_submit(slave, request).ok())
     }
 
-    fn begin_direct(
-        &mut self,
-        axis: usize,
-        target: Target,
-        write: bool,
-        data: Vec<u8>,
-    ) -> Result<(), (DirectFailure, Vec<u8>)> {
+    fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {
+        let DirectTask { target, write, data } = task;
         let Target::Element(idn, element) = target else { return Err((DirectFailure::OtherBus, data)) };
         let slave = self.drive_of(axis).and_then(Drive::present_slave);
         let Some(slave) = slave else { return Err((DirectFailure::NoDrive, data)) };
