@@ -2,6 +2,7 @@
 //! drive, and the reply.
 
 use axisbridge::config::Config;
+use axisbridge::engine::axis::Owner;
 use axisbridge::engine::direct::{DirectEnd, DirectNorth, DirectRequest};
 use axisbridge::engine::local::{ClientEnd, LocalNorth, Order, Request};
 use axisbridge::local::drive::job::{Context, Job, Step};
@@ -11,7 +12,7 @@ use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cia402::node::dictionary::{self, DataType};
 use profile_cia402::wire::Mux;
-use profile_cip::controller::Step as Move;
+use profile_cip::controller::{AxisSet, Step as Move};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::DriveState;
 use profile_sercos::slave::parameter::Definition;
@@ -311,6 +312,46 @@ fn nothing_is_written_while_somebody_controls_the_axis_and_everything_is_read() 
     bench.rig.cable = false;
     let reply = bench.say("read turntable P-0-4000");
     assert!(reply.starts_with("error read turntable unanswered: P-0-4000: "), "{reply}");
+}
+
+/// A controller that vanished has left the axis to nobody, and its drive holds the axis in its place.
+#[test]
+fn nothing_is_written_while_a_drive_holds_an_axis_with_torque_that_nobody_controls() {
+    let configuration =
+        BOX.replace("instance = ", "on_command_loss = \"current-decel-and-hold\"\ninstance = ");
+    let settings = Settings { configuration: configuration.clone(), ..Settings::default() };
+    let mut bench = Bench::new(Rig::new(settings), &configuration);
+    let gain = "S-0-0104";
+    let before = bench.object(&format!("read turntable {gain}"))["value"].clone();
+    bench.rig.connect(vec![Move::Enable(AxisSet::one(1)), Move::Dwell { seconds: 1_000.0 }]);
+    bench.rig.run_until(millis(60_000), "torque", |rig| rig.engine.axes()[0].may_have_torque());
+    bench.rig.run_for(millis(500));
+    bench.rig.kill_controller();
+    bench.rig.run_for(millis(3_000));
+    let axis = &bench.rig.engine.axes()[0];
+    assert_eq!((axis.has_controller(), axis.owner(), axis.may_have_torque()), (false, Owner::Nobody, true));
+    let reply = bench.say(&format!("write turntable {gain} 2.5"));
+    let expected =
+        "error write turntable torque: S-0-0104: parameters are not written while the drive has torque\n";
+    assert_eq!(reply, expected);
+    assert_eq!(bench.object(&format!("read turntable {gain}"))["value"], before);
+    assert_eq!(bench.object(&format!("write slide {gain} 2.5"))["value"], "2.50", "a drive without torque");
+}
+
+/// Both axes of a CANopen device have one drive: whoever controls one of them keeps the parameters of both.
+#[test]
+fn nothing_is_written_while_somebody_controls_the_other_axis_of_the_same_device() {
+    let configuration = include_str!("can.toml").replace("node = 2", "node = 1\naxis = 1");
+    let settings =
+        Settings { configuration: configuration.clone(), drives: Vec::new(), ..Settings::default() };
+    let mut bench = Bench::new(Rig::new(settings), &configuration);
+    assert_eq!(bench.object("write slide 6881h 500")["value"], "500", "nobody controls either");
+    bench.enable();
+    for line in ["write slide 6881h 600", "write turntable 6081h 600"] {
+        let reply = bench.say(line);
+        assert!(reply.contains(" held: "), "{line}: {reply}");
+    }
+    assert_eq!(bench.object("read slide 6881h")["value"], "500");
 }
 
 #[test]
