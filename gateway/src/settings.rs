@@ -16,7 +16,7 @@
 //! ```
 
 use std::collections::BTreeMap;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,6 +26,8 @@ use profile_cip::device::event::{Event, ResetKind};
 use profile_cip::device::qos::DSCP_MAX;
 use profile_cip::device::tcp_ip::INACTIVITY_TIMEOUT_MAX_S;
 use serde::{Deserialize, Serialize};
+
+use crate::replace_file::replace_file;
 
 /// Bytes of a settings file; a real one has a few hundred for each device.
 const FILE_LEN_MAX: u64 = 1 << 16;
@@ -207,15 +209,8 @@ fn read(path: &Path) -> Result<Settings, SettingsError> {
     Ok(settings)
 }
 
-/// Writes beside the file and puts it in its place, so that a loss of power leaves the old one or the new one.
 fn write(path: &Path, settings: &Settings) -> io::Result<()> {
-    let text = toml::to_string(settings).map_err(io::Error::other)?;
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".new");
-    let mut file = std::fs::File::create(&beside)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()?;
-    std::fs::rename(&beside, path)
+    replace_file(path, &toml::to_string(settings).map_err(io::Error::other)?)
 }
 
 #[cfg(test)]

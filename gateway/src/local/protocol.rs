@@ -440,6 +440,12 @@ pub fn parameter_list(parameters: &[NamedParameter]) -> String {
     text
 }
 
+/// Text of a drive on one line, without what a terminal would act upon.
+#[must_use]
+pub fn printable(text: &str) -> String {
+    text.chars().map(|letter| if letter.is_control() { '?' } else { letter }).collect()
+}
+
 /// A line for each parameter of the overlays.
 #[must_use]
 pub fn parameter_lines(parameters: &[NamedParameter]) -> String {

@@ -10,6 +10,7 @@ use super::file::{Backup, Kept};
 use super::show;
 use crate::cli::progress::Progress;
 use crate::cli::{CliError, print};
+use crate::local::protocol::printable;
 
 /// A parameter in which the drive and the backup differ.
 #[derive(Debug, PartialEq, Eq, Serialize)]
@@ -85,8 +86,8 @@ fn text(differences: &[Difference], count: usize) -> String {
     let mut rows = vec![["parameter", "backup", "drive", "name"].map(str::to_owned)];
     rows.extend(differences.iter().map(|difference| {
         let Difference { id, name, backup, drive, why } = difference;
-        let drive = drive.as_ref().or(why.as_ref()).map_or_else(String::new, |text| show::plain(text));
-        [id.clone(), show::plain(backup), drive, show::plain(name)]
+        let drive = drive.as_ref().or(why.as_ref()).map_or_else(String::new, |text| printable(text));
+        [id.clone(), printable(backup), drive, printable(name)]
     }));
     format!("{}\n{} of {count} parameters differ\n", show::table(&rows), differences.len())
 }

@@ -10,6 +10,7 @@ use crate::cli::CliError;
 use crate::local::drive::id::Id;
 use crate::local::drive::job::ParameterReport;
 use crate::local::drive::value::unhex;
+use crate::replace_file::replace_file;
 
 /// The format of the files that are written, and the only one that is read.
 const FORMAT: u32 = 1;
@@ -188,12 +189,8 @@ impl Backup {
 
     /// Writes a file, whole or not at all.
     pub fn save(&self, path: &Path) -> Result<(), CliError> {
-        let fail = |error: std::io::Error| format!("{}: {error}", path.display());
-        let mut beside = path.as_os_str().to_owned();
-        beside.push(".new");
-        std::fs::write(&beside, self.to_text()?).map_err(fail)?;
-        std::fs::rename(&beside, path).map_err(fail)?;
-        Ok(())
+        let text = self.to_text()?;
+        Ok(replace_file(path, &text).map_err(|error| format!("{}: {error}", path.display()))?)
     }
 
     /// Whether the drive of an axis can have these parameters: the bus must be the same, and the type of the drive, unless it is

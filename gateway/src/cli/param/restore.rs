@@ -13,6 +13,7 @@ use super::file::{Backup, Kept};
 use super::show;
 use crate::cli::CliError;
 use crate::cli::progress::Progress;
+use crate::local::protocol::printable;
 
 /// Times that what was refused is tried, at most.
 const PASSES_MAX: usize = 8;
@@ -41,10 +42,10 @@ pub fn run(arguments: &RestoreArguments) -> Result<ExitCode, CliError> {
     let mut restore = Restore::default();
     let ended = restore.run(&mut drive, &backup);
     for kept in &restore.written {
-        println!("{} = {}", kept.id, show::plain(&kept.value));
+        println!("{} = {}", kept.id, printable(&kept.value));
     }
     for (kept, why) in &restore.refused {
-        eprintln!("not restored: {} = {}: {}", kept.id, show::plain(&kept.value), show::plain(why));
+        eprintln!("not restored: {} = {}: {}", kept.id, printable(&kept.value), printable(why));
     }
     let done = restore.equal + restore.written.len();
     let count = backup.parameter.len();
@@ -69,8 +70,8 @@ pub fn run(arguments: &RestoreArguments) -> Result<ExitCode, CliError> {
             eprintln!(
                 "changed by another one: {} = {} in the backup, {} in the drive",
                 difference.id,
-                show::plain(&difference.backup),
-                show::plain(found)
+                printable(&difference.backup),
+                printable(found)
             );
         }
     }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::drive::List;
 use crate::cli::CliError;
 use crate::local::drive::job::ParameterReport;
+use crate::local::protocol::printable;
 
 /// A parameter as one JSON object in a line.
 pub fn json(report: &ParameterReport) -> Result<String, CliError> {
@@ -17,12 +18,12 @@ pub fn parameter(report: &ParameterReport) -> String {
         report;
     let mut text = id.clone();
     if let Some(name) = name {
-        let _ = write!(text, " {}", plain(name));
+        let _ = write!(text, " {}", printable(name));
     }
     text.push('\n');
     let with_unit = |value: &str| match unit {
-        Some(unit) => format!("{} {}", plain(value), plain(unit)),
-        None => plain(value),
+        Some(unit) => format!("{} {}", printable(value), printable(unit)),
+        None => printable(value),
     };
     let rows = [
         ("value", Some(with_unit(value))),
@@ -43,9 +44,10 @@ pub fn parameter(report: &ParameterReport) -> String {
 
 /// What was written.
 pub fn written(report: &ParameterReport) -> String {
-    let unit = report.unit.as_ref().map(|unit| format!(" {}", plain(unit))).unwrap_or_default();
-    let before = report.before.as_ref().map(|before| format!(" (was {})", plain(before))).unwrap_or_default();
-    let mut text = format!("{} = {}{unit}{before}\n", report.id, plain(&report.value));
+    let unit = report.unit.as_ref().map(|unit| format!(" {}", printable(unit))).unwrap_or_default();
+    let before =
+        report.before.as_ref().map(|before| format!(" (was {})", printable(before))).unwrap_or_default();
+    let mut text = format!("{} = {}{unit}{before}\n", report.id, printable(&report.value));
     if report.recommission {
         text += RECOMMISSION;
     }
@@ -60,7 +62,7 @@ pub const RECOMMISSION: &str = "\
 pub fn list(list: &List) -> String {
     let head = ["parameter", "access", "type", "unit", "name"].map(str::to_owned);
     let row = |listed: &super::drive::Listed| {
-        let detail = |key| plain(listed.detail(key));
+        let detail = |key| printable(listed.detail(key));
         [listed.id.clone(), detail("access"), detail("type"), detail("unit"), detail("name")]
     };
     let mut rows = vec![head];
@@ -94,11 +96,6 @@ pub fn table<const N: usize>(rows: &[[String; N]]) -> String {
         let _ = writeln!(text, "{}", cells.join("  ").trim_end());
     }
     text
-}
-
-/// Text of a drive without what a terminal would act upon.
-pub fn plain(text: &str) -> String {
-    text.chars().map(|letter| if letter.is_control() { '?' } else { letter }).collect()
 }
 
 #[cfg(test)]

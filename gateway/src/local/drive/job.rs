@@ -17,7 +17,7 @@ use super::id::Id;
 use super::known::{Bus, Catalogue, belongs_to_gateway, rescales};
 use super::value::{Kind, hex};
 use crate::engine::direct::{DATA_MAX, DirectAnswer, DirectFailure, Direction, Target};
-use crate::local::protocol::{NamedParameter, parameter_lines};
+use crate::local::protocol::{NamedParameter, parameter_lines, printable};
 
 /// Longest name, unit or limit that is shown, bytes.
 const ELEMENT_MAX: usize = 1_024;
@@ -379,7 +379,7 @@ const fn list_idn(backup: bool) -> Idn {
 
 fn error(ask: &Ask, context: &Context<'_>, code: &str, text: &str) -> String {
     // Texts of drives may have anything in them; a reply is one line.
-    let text: String = text.chars().map(|letter| if letter.is_control() { '?' } else { letter }).collect();
+    let text = printable(text);
     format!("error {} {} {code}: {text}\n", ask.word(), context.axis)
 }
 

@@ -288,7 +288,7 @@ mod tests {
         let page = page(&outcome);
         let tables = [&texts.cip_generic, &texts.generic_sercos, &texts.generic_cia402];
         let rows: usize = tables.iter().map(|table| rows_of(&table.text)).sum();
-        assert!(rows > 800, "{rows}");
+        assert!(rows > 870, "{rows}");
         assert!(page.matches("<tr id=").count() > rows, "{}", page.matches("<tr id=").count());
         assert!(page.contains("a &lt; b") && !page.contains("a < b"));
         assert!(page.contains("<h3>generic-sercos.parameter</h3>"));
