@@ -81,6 +81,8 @@ pub struct AttributeDefinition {
     pub codes: Vec<u32>,
     /// Bits of a bit field that mean something; the others have to be 0.
     pub bits: Option<u64>,
+    /// The standard requires it of no device that closes a loop.
+    pub is_optional: bool,
     /// Name of the standard.
     pub name: String,
 }
@@ -111,6 +113,7 @@ impl AttributeDefinition {
             element_rules: Vec::new(),
             codes: Vec::new(),
             bits: None,
+            is_optional: false,
             name: name.to_owned(),
         }
     }

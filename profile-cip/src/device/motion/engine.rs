@@ -157,6 +157,10 @@ impl Engine {
             }
             if connection.schedule.mode == Mode::Synchronous {
                 self.node.synchronization(self.clock.is_synchronized(), now);
+                let variance = u64::from(self.clock.quality().variance);
+                if self.instances.sync_threshold().is_some_and(|threshold| variance > threshold) {
+                    self.node.jitter(now);
+                }
             }
         }
         self.step(system_time);
@@ -187,6 +191,7 @@ impl Engine {
         }
         let header = self.connection.as_ref().and_then(|c| c.header);
         let (lost, late) = self.statistics.diagnostics();
+        let quality = self.clock.quality();
         self.instances.publish_class(&[
             (id::NODE_CONTROL, header.map_or(0, |h| u64::from(h.node_control.bits()))),
             (id::NODE_STATUS, u64::from(self.node_status().bits())),
@@ -194,6 +199,8 @@ impl Engine {
             (id::NODE_ALARM_CODE, u64::from(self.node.alarm().0)),
             (id::CONTROLLER_UPDATE_PERIOD, self.connection.as_ref().map_or(0, IoConnection::period)),
             (id::CONTROLLER_TIME_STAMP, header.and_then(|h| h.time_stamp).unwrap_or(0)),
+            (id::SYNC_VARIANCE, u64::from(quality.variance)),
+            (id::SYNC_UPDATE_DELAY, u64::from(quality.update_delay().to_bits())),
             (id::TIME_DATA_SET, header.map_or(0, |h| u64::from(h.time_data_set().bits()))),
             (id::LOST_UPDATES, u64::from(lost)),
             (id::LATE_UPDATES, u64::from(late)),

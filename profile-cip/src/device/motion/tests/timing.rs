@@ -1,8 +1,10 @@
 //! Lost and late updates, asynchronous and synchronous production.
 
 use super::*;
+use crate::device::attribute::id;
 use crate::device::axis::drive_link::{DriveAction, Withheld};
 use crate::device::axis::state::AxisState;
+use crate::device::motion_link::SyncQuality;
 use crate::wire::motion::UpdateDiagnostics;
 use crate::wire::motion::codes::{NodeAlarm, NodeFault, NodeStatus};
 
@@ -655,4 +657,53 @@ fn a_lost_drive_reports_no_velocity() {
     rig.drives[0].image.online = false;
     rig.cycles(2);
     assert_eq!(rig.actual(0).actual.velocity, None);
+}
+
+/// A running rig in synchronous operation, whose clock measures how well it is synchronized.
+fn measuring() -> Rig {
+    let class = |id, data_type, access| AttributeDefinition::new(Scope::Class, id, data_type, access, "");
+    let mut attributes = definitions();
+    attributes.extend([
+        class(id::SYNC_VARIANCE, DataType::Udint, Access::Get),
+        class(id::SYNC_THRESHOLD, DataType::Udint, Access::Set),
+        class(id::SYNC_UPDATE_DELAY, DataType::Real, Access::Get),
+    ]);
+    let mut rig = Rig::measuring(10_000, attributes);
+    rig.open();
+    rig.request_all(AxisControl::ENABLE);
+    rig.time = TimeDataSet::TIME_STAMP | TimeDataSet::UPDATE_DIAGNOSTICS;
+    rig.control |= NodeControl::SYNC_CONTROL;
+    rig.cycles(10);
+    assert!(rig.device.is_synchronous());
+    rig
+}
+
+#[test]
+fn variation_beyond_the_threshold_of_the_controller_is_an_alarm_while_synchronous() {
+    let mut rig = measuring();
+    let quality = SyncQuality { variance: 20_000, steps_removed: 3, log_sync_interval: -1 };
+    rig.device.set_sync_quality(SyncQuality { variance: 9_000, ..quality });
+    rig.cycles(10_000_000_000 / usize::try_from(PERIOD).expect("a period") + 10);
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::NONE);
+    rig.device.set_sync_quality(quality);
+    rig.cycle();
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::CLOCK_JITTER);
+    let read = |rig: &Rig, id| rig.device.engine.instances.class_value(id);
+    rig.device.engine.publish(0);
+    assert_eq!(read(&rig, id::SYNC_VARIANCE), 20_000);
+    assert_eq!(read(&rig, id::SYNC_UPDATE_DELAY), u64::from(1.5_f32.to_bits()), "3 steps of half a second");
+
+    // A controller that takes more: the source of the time goes by it, and so does the alarm.
+    assert_eq!(rig.device.sync_threshold(), Some(10_000));
+    rig.device.engine.instances.publish_class(&[(id::SYNC_THRESHOLD, 30_000)]);
+    assert_eq!(rig.device.sync_threshold(), Some(30_000));
+    rig.cycles(10_000_000_000 / usize::try_from(PERIOD).expect("a period") + 10);
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::NONE, "ten seconds after its cause");
+
+    // It counts as long as the connection.
+    rig.close();
+    assert_eq!(rig.device.sync_threshold(), None);
+    rig.packet.clear();
+    rig.open();
+    assert_eq!(rig.device.sync_threshold(), Some(10_000));
 }
