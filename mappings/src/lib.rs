@@ -371,7 +371,12 @@ impl Mapping {
             let most =
                 if least == unsupported { unsupported } else { exception::ExceptionAction::MAJOR_FAULT.0 };
             let range = (f64::from(least), f64::from(most));
-            ElementRule { default: DefaultValue::Integer(i64::from(default)), range }
+            // A controller whose profile lacks an exception says 255 for it, whatever the device has.
+            ElementRule {
+                default: DefaultValue::Integer(i64::from(default)),
+                range,
+                keeps: Some(unsupported),
+            }
         };
         (0..EXCEPTION_BITS).map(rule).collect()
     }

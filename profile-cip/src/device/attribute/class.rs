@@ -63,7 +63,7 @@ fn list(row: &mut AttributeDefinition, mut entries: Vec<u16>) {
     row.elements = Some(count + 1);
     let fixed = |entry: u16| {
         let default = DefaultValue::Integer(entry.into());
-        ElementRule { default, range: (f64::from(entry), f64::from(entry)) }
+        ElementRule { default, range: (f64::from(entry), f64::from(entry)), keeps: None }
     };
     row.element_rules = entries.into_iter().map(fixed).collect();
 }

@@ -94,6 +94,16 @@ pub struct ElementRule {
     pub default: DefaultValue,
     /// Its permitted values, ends included.
     pub range: (f64, f64),
+    /// A value that leaves the element as it is, in the octets of the type; it is taken and not stored.
+    pub keeps: Option<u8>,
+}
+
+impl ElementRule {
+    /// Whether a value leaves the element as it is.
+    #[must_use]
+    pub fn keeps_with(&self, element: &[u8]) -> bool {
+        self.keeps.is_some_and(|keeps| element == [keeps])
+    }
 }
 
 impl AttributeDefinition {

@@ -129,6 +129,7 @@ pub(crate) struct Rig {
 /// The exceptions that an axis finds itself stop it, as long as the controller says nothing else; others are ignored.
 fn exception_rules() -> Vec<ElementRule> {
     let rule = |code| ElementRule {
+        keeps: None,
         default: DefaultValue::Integer(if matches!(code, 60 | 62) { 3 } else { 0 }),
         range: (0.0, 255.0),
     };
