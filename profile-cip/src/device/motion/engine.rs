@@ -16,7 +16,7 @@ use crate::device::axis::Context;
 use crate::device::axis::exception::ExceptionActions;
 use crate::device::motion_link::{CloseParameters, MotionReply, OpenParameters, OpenRefusal};
 use crate::wire::motion::codes::{NodeAlarm, NodeControl, NodeFault};
-use crate::wire::motion::{FORMAT_REVISION, Format};
+use crate::wire::motion::{FORMAT_REVISION, FORMAT_REVISION_RUN_IDLE, Format};
 use crate::wire::status::GeneralStatus;
 
 /// Instances of an update: the class and the axes.
@@ -94,7 +94,10 @@ impl Engine {
         if self.connection.is_some() {
             return refuse(OWNERSHIP_CONFLICT);
         }
-        if parameters.format_revision != FORMAT_REVISION {
+        let has_run_idle = parameters.format_revision == FORMAT_REVISION_RUN_IDLE;
+        if parameters.format_revision != FORMAT_REVISION
+            && !(has_run_idle && self.config.format == Format::Variable)
+        {
             return refuse(INVALID_CONNECTION_POINT);
         }
         fixed::check_format(self.config.format, &parameters)?;

@@ -707,3 +707,43 @@ fn variation_beyond_the_threshold_of_the_controller_is_an_alarm_while_synchronou
     rig.open();
     assert_eq!(rig.device.sync_threshold(), Some(10_000));
 }
+
+/// Connection point 3: a run/idle header in front of each update, both ways, and its revision in it.
+#[test]
+fn updates_of_format_revision_3_run_or_are_idle() {
+    let mut rig = Rig::new();
+    let parameters = OpenParameters { format_revision: 3, ..rig.open_parameters() };
+    let reply = rig.request(MotionRequest::Open(parameters));
+    assert_eq!(reply, Some(MotionReply::Opened { token: parameters.token, outcome: Ok(()) }));
+    rig.configure();
+    // What the rig writes, as such a controller would.
+    let send = |rig: &mut Rig, header: [u8; 4], revision: u8| -> NodeStatus {
+        rig.now += PERIOD;
+        let command = CommandHeader { last_received_id: 0, ..rig.command_header() };
+        rig.sequence += 1;
+        rig.update_id += 1;
+        let packet = rig.packet_with(&CommandHeader { update_id: rig.update_id, ..command });
+        let mut data = [&packet[..2], &header, &packet[2..]].concat();
+        data[2 + 4 + 1] = revision;
+        rig.send(&data);
+        assert!(rig.run_device(), "an update goes out in each period");
+        let sent = std::mem::take(&mut rig.packet);
+        assert_eq!((&sent[2..6], &sent[6..8]), (&[1, 0, 0, 0][..], &[7, 3][..]), "{sent:?}");
+        let frame = ActualFrame::parse_as(&sent[6..], 3).expect("an update");
+        // The rig reads updates of revision 2.
+        rig.packet = [&sent[..2], &[7, 2], &sent[8..]].concat();
+        frame.header().node_status
+    };
+    let run = |rig: &mut Rig, header| (0..20).map(|_| send(rig, header, 3)).last().expect("20 periods");
+    assert!(run(&mut rig, [1, 0, 0, 0]).contains(NodeStatus::DATA_VALID));
+    rig.request_all(AxisControl::ENABLE);
+    run(&mut rig, [1, 0, 0, 0]);
+    assert_eq!(rig.state(0), AxisState::Running);
+    // An idle originator: its data mean nothing, and the axes stop as without data.
+    assert!(!run(&mut rig, [0, 0, 0, 0]).contains(NodeStatus::DATA_VALID));
+    assert_ne!(rig.state(0), AxisState::Running);
+    // The revision of another connection point is a wrong form.
+    assert_eq!(rig.device.counters().malformed, 0);
+    send(&mut rig, [1, 0, 0, 0], 2);
+    assert_eq!(rig.device.counters().malformed, 1);
+}
