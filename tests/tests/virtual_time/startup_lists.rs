@@ -89,11 +89,11 @@ fn what_a_sercos_drive_has_otherwise_is_written_in_its_phase_and_the_axis_moves_
         entry("S-0-0121", "5", ""),
         entry("S-0-0122", "2", "on_difference = \"write\""),
         entry("P-0-0123", &RARE.to_string(), ""),
-        entry("S-0-0104", "1.00", "on_difference = \"refuse\""),
+        entry("S-0-0104", "3.00", "on_difference = \"refuse\""),
     ];
     let mut rig = with_own(sercos("", &entries), CP3, 0);
     let kv = rig.line.slaves()[0].store().number_of(Idn::standard(104));
-    assert_eq!(kv, 100, "the drive has what the list expects");
+    assert_eq!(kv, 300, "the drive has what the list expects");
     rig.line.slaves_mut()[0].preset(Idn::standard(76), 0x02);
     // The phases in which the value of the own parameter is on the wire.
     let seen: Rc<RefCell<Vec<u8>>> = Rc::default();
@@ -243,6 +243,7 @@ fn a_difference_that_only_warns_leaves_drive_and_axis_as_they_are() {
     let entries = [entry("P-0-0123", "7", ""), entry("S-0-0121", "1", "on_difference = \"refuse\"")];
     let mut rig = with_own(sercos("on_startup_difference = \"warn\"", &entries), CP2_CP3, 3);
     rig.until_ready();
+    rig.run_for(millis(100));
     let expected = [
         "axis 1: start-up list: P-0-0123 is 3, expected 7; the drive is used nevertheless (on_difference = \"warn\")",
         "axis 1: start-up list: 1 entry holds, 0 of them written",
@@ -292,7 +293,7 @@ fn what_a_canopen_drive_has_otherwise_is_written_before_it_is_started_and_the_ax
     let entries = [
         entry("6091:01", "5", ""),
         entry("0x6091.2", "2", "type = \"u32\""),
-        entry("6086h", "0", "type = \"i16\"\non_difference = \"refuse\""),
+        entry("608F:02", "1", "type = \"u32\"\non_difference = \"refuse\""),
     ];
     let mut rig = Rig::new(can("", &entries));
     rig.run_until(millis(20_000), "the gear", |rig| [1, 2].map(|sub| object(rig, 0x6091, sub)) == [5, 2]);
@@ -362,9 +363,8 @@ fn a_canopen_drive_that_does_not_keep_a_value_is_left_out_and_one_that_comes_bac
     let mut rig = Rig::ready(can("", &entries));
     // Switched off and on, it has forgotten its gear.
     let forget = |rig: &mut Rig| {
-        let node = rig.can[0].bus.nodes_mut().next().expect("a device");
-        node.dictionary_mut().set(0x6091, 1, 1);
-        node.power_on();
+        let now = rig.now();
+        rig.can[0].bus.nodes_mut().next().expect("a device").power_cycle(now);
     };
     forget(&mut rig);
     rig.run_until(millis(20_000), "the gear", |rig| object(rig, 0x6091, 1) == 5);
@@ -417,6 +417,6 @@ fn a_backup_is_a_list() {
     come_up(&mut rig);
     let expected = "axis 1: the start-up list of the drive failed: S-0-1300.0.3 is ";
     let told = told(&rig);
-    assert!(told[0].starts_with(expected) && told[0].contains(", expected 0x7777"), "{told:#?}");
+    assert!(told[0].starts_with(expected) && told[0].contains(", expected 30583 (on_difference"), "{told:#?}");
     assert_eq!(held(&rig, Idn::standard(121)), 1, "nothing is written to it");
 }
