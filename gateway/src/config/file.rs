@@ -437,7 +437,7 @@ pub struct ObjectStartupTable {
     /// The type of the object, such as `"u32"`. Default: that of the device's `configuration`, or of the dictionary.
     #[serde(rename = "type")]
     #[schemars(transform = form::word(Cia402Type::NAMED))]
-    pub data_type: Option<Spanned<String>>,
+    pub kind: Option<Spanned<String>>,
     /// What is done when the drive has another value. Default: `on_startup_difference` of the drive.
     #[schemars(transform = form::word(&OnDifference::NAMED))]
     pub on_difference: Option<Spanned<String>>,

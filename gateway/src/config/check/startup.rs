@@ -43,7 +43,7 @@ pub(super) fn can(problems: &mut Problems, table: &CanDriveTable) -> Option<Vec<
         let entry = entry.get_ref();
         let id = number(problems, &entry.parameter, OBJECT, |id| matches!(id, Id::Object(_)));
         let on_difference = word(problems, entry.on_difference.as_ref(), usual.unwrap_or_default());
-        let data_type = value::optional(&entry.data_type, |word| {
+        let data_type = value::optional(&entry.kind, |word| {
             value::word(problems, word, "type of an object", Cia402Type::NAMED)
         });
         let fits = data_type.flatten().is_none_or(|kind| fits(problems, &entry.value, kind));
