@@ -417,6 +417,9 @@ fn a_backup_is_a_list() {
     come_up(&mut rig);
     let expected = "axis 1: the start-up list of the drive failed: S-0-1300.0.3 is ";
     let told = told(&rig);
-    assert!(told[0].starts_with(expected) && told[0].contains(", expected 30583 (on_difference"), "{told:#?}");
+    assert!(
+        told[0].starts_with(expected) && told[0].contains(", expected 30583 (on_difference"),
+        "{told:#?}"
+    );
     assert_eq!(held(&rig, Idn::standard(121)), 1, "nothing is written to it");
 }
