@@ -14,6 +14,7 @@ pub mod local;
 pub mod log_limit;
 pub mod modbus;
 pub mod north;
+pub mod parameter;
 mod replace_file;
 pub mod runner;
 pub mod scan;

@@ -154,6 +154,7 @@ pub use truth::{AttributeTruth, Truth};
 use crate::finding::{Findings, Severity};
 use profile_cip::device::attribute::{DefaultValue, ElementRule};
 use profile_cip::device::exception;
+use profile_sercos::wire::idn::Idn;
 
 /// Bits of Axis Exceptions.
 const EXCEPTION_BITS: u8 = 64;
@@ -440,6 +441,22 @@ impl Mapping {
     /// As [`Mapping::telegram`], and when the scaling was not read or has no row.
     pub fn sercos_program(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<DriveProgram, SercosError> {
         DriveProgram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+    }
+
+    /// The IDNs that commissioning writes into the drive of an axis, by number.
+    #[must_use]
+    pub fn sercos_written(&self, axis: &SercosAxis) -> Vec<Idn> {
+        self.sercos.written(axis)
+    }
+
+    /// The objects that commissioning writes into the drive of an axis, by number, as they are on the device.
+    #[must_use]
+    pub fn cia402_written(&self, axis: &Cia402Axis) -> Vec<Object> {
+        let of_axis = |object: Object| match axis.item(object)? {
+            Item::Object(object) => Some(object),
+            Item::Idn(_) | Item::Attribute(_) => None,
+        };
+        self.cia402.written(axis).into_iter().filter_map(of_axis).collect()
     }
 
     /// What is asked of a CiA 402 drive at start, or told to it.

@@ -13,6 +13,7 @@ mod frames;
 mod marks;
 mod modbus;
 pub mod schema;
+mod startup;
 
 use std::path::{Path, PathBuf};
 
@@ -76,6 +77,7 @@ fn axes(tables: &mapping::check::Outcome, written: &Written, findings: &mut Find
         can_bus::check(mapping, written, &mut findings);
         devicenet_bus::check(mapping, written, &mut findings);
         modbus::check(mapping, written, &mut findings);
+        startup::check(mapping, written, &mut findings);
         findings
     };
     let own = tables.mapping.as_ref().map(of);

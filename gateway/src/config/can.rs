@@ -13,6 +13,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 
 use super::known_object::KnownObject;
+use crate::parameter::startup::StartupEntry;
 
 /// A CAN bus with CANopen drives.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -136,4 +137,6 @@ pub struct CanDrive {
     pub way_of_a_turn: Option<Ratio>,
     /// Generic units in one count, where the drive is not to be asked.
     pub counts: Vec<(Quantity, Ratio)>,
+    /// Its start-up list.
+    pub startup: Vec<StartupEntry>,
 }

@@ -7,9 +7,11 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::scalar::Scalar;
 use super::{check, form};
 use crate::finding::Spanned;
-use crate::mapping::VOLTAGE_BIT;
+use crate::mapping::{Cia402Type, VOLTAGE_BIT};
+use crate::parameter::startup::OnDifference;
 
 /// The whole file.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -395,6 +397,50 @@ pub struct DriveTable {
     /// Whether it may be plugged in while the bus runs: the bus starts without it and keeps its place in the telegrams. At least one drive
     /// has to be there from the start. Default: false.
     pub hot_plug: Option<Spanned<bool>>,
+    /// What parameters of the drive have to be before it takes part in the cycle: its start-up list. Default: none.
+    #[serde(default)]
+    pub startup: Vec<Spanned<StartupTable>>,
+    /// A backup made by `axisbridge param backup` as start-up list, below the entries of `startup`. A path relative to the folder of this
+    /// file. Default: none.
+    #[schemars(transform = form::path)]
+    pub startup_file: Option<Spanned<String>>,
+    /// What is done when the drive has another value, for entries that do not say it: `"write"` writes the value and reads it back,
+    /// `"refuse"` does not use the drive, `"warn"` logs it. Default: `"write"`.
+    #[schemars(transform = form::word(&OnDifference::NAMED))]
+    pub on_startup_difference: Option<Spanned<String>>,
+}
+
+/// `[[south.sercos.drive.startup]]`: an entry of the start-up list of a SERCOS drive.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StartupTable {
+    /// The IDN, such as `"S-0-0121"`, `"P-0-0123"` or `"S-0-1300.0.3"`.
+    #[schemars(transform = form::idn)]
+    pub parameter: Spanned<String>,
+    /// The value, in the decimals that the attribute of the IDN has: a number, or a text as `axisbridge param read` shows it, such as
+    /// `"0b0101"`, `"S-0-0040,S-0-0051"` or `"hex:0a00"`.
+    pub value: Spanned<Scalar>,
+    /// What is done when the drive has another value. Default: `on_startup_difference` of the drive.
+    #[schemars(transform = form::word(&OnDifference::NAMED))]
+    pub on_difference: Option<Spanned<String>>,
+}
+
+/// `[[south.can.drive.startup]]`: an entry of the start-up list of a CANopen drive.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectStartupTable {
+    /// The object as the device numbers it, such as `"6091:01"`, `"0x6091.1"` or `"2001h"`; behind `:` hexadecimal, behind `.` decimal.
+    #[schemars(transform = form::object)]
+    pub parameter: Spanned<String>,
+    /// The value: a number, or a text as `axisbridge param read` shows it, such as `"hex:0a00"`.
+    pub value: Spanned<Scalar>,
+    /// The type of the object, such as `"u32"`. Default: that of the device's `configuration`, or of the dictionary.
+    #[serde(rename = "type")]
+    #[schemars(transform = form::word(Cia402Type::NAMED))]
+    pub kind: Option<Spanned<String>>,
+    /// What is done when the drive has another value. Default: `on_startup_difference` of the drive.
+    #[schemars(transform = form::word(&OnDifference::NAMED))]
+    pub on_difference: Option<Spanned<String>>,
 }
 
 /// `[[south.can]]`
@@ -473,6 +519,17 @@ pub struct CanDriveTable {
     pub millimetres_per_turn: Option<Spanned<f64>>,
     /// Counts in an axis unit, for a drive that does not report its scaling or reports it wrongly. Default: what the drive reports.
     pub counts: Option<CountsTable>,
+    /// What objects of the drive have to be before it takes part in the cycle: its start-up list. Default: none.
+    #[serde(default)]
+    pub startup: Vec<Spanned<ObjectStartupTable>>,
+    /// A backup made by `axisbridge param backup` as start-up list, below the entries of `startup`. A path relative to the folder of this
+    /// file. Default: none.
+    #[schemars(transform = form::path)]
+    pub startup_file: Option<Spanned<String>>,
+    /// What is done when the drive has another value, for entries that do not say it: `"write"` writes the value and reads it back,
+    /// `"refuse"` does not use the drive, `"warn"` logs it. Default: `"write"`.
+    #[schemars(transform = form::word(&OnDifference::NAMED))]
+    pub on_startup_difference: Option<Spanned<String>>,
 }
 
 /// `[[south.can.device]]`: settings for a device as a whole, whatever axes it has.

@@ -65,6 +65,22 @@ pub fn revision(schema: &mut Schema) {
     pattern(schema, "^0*([1-9][0-9]?|1[01][0-9]|12[0-7])\\.0*([1-9][0-9]?|1[0-9]{2}|2[0-4][0-9]|25[0-5])$");
 }
 
+/// A number of up to 8 bits as a text.
+const OCTET: &str = "0*(25[0-5]|2[0-4][0-9]|1[0-9]{2}|[1-9]?[0-9])";
+
+/// The number of a parameter of a SERCOS drive.
+pub fn idn(schema: &mut Schema) {
+    let block = "0*(409[0-5]|40[0-8][0-9]|[1-3][0-9]{3}|[1-9]?[0-9]{1,2})";
+    pattern(schema, format!("^[SsPp]-0*[0-7]-{block}(\\.{OCTET}\\.{OCTET})?$"));
+}
+
+/// The number of an object of a CANopen device.
+pub fn object(schema: &mut Schema) {
+    let (index, sub) = ("[0-9A-Fa-f]{4}", "0*[0-9A-Fa-f]{1,2}");
+    let marked = format!("(0x{index}|{index}h)");
+    pattern(schema, format!("^({marked}(\\.({OCTET}|0x{sub}))?|({marked}|{index}):{sub})$"));
+}
+
 /// A number above zero.
 pub fn positive(schema: &mut Schema) {
     schema.insert("exclusiveMinimum".to_owned(), Value::from(0));

@@ -17,7 +17,9 @@ pub(crate) mod form;
 mod known_object;
 mod named;
 mod rated;
+pub mod scalar;
 mod sercos;
+mod startup_file;
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -212,7 +214,9 @@ impl Written {
         match check::check(&file) {
             Ok(config) if read.faultless => {
                 let mut written = Self { text, file, config };
-                device_file::load(folder, &mut written, findings).then_some(written)
+                let devices = device_file::load(folder, &mut written, findings);
+                let lists = startup_file::load(folder, &mut written, findings);
+                (devices && lists).then_some(written)
             }
             Ok(_) => None,
             Err(problems) => {

@@ -5,6 +5,7 @@ use profile_generic::time::DurationNs;
 use profile_sercos::master::config::AddressPolicy;
 
 use crate::mapping::Rated;
+use crate::parameter::startup::StartupEntry;
 
 /// How the bus is reached.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -86,4 +87,6 @@ pub struct Drive {
     pub rated: Option<Rated>,
     /// Whether it may be plugged in while the bus is in operation.
     pub hot_plug: bool,
+    /// Its start-up list.
+    pub startup: Vec<StartupEntry>,
 }

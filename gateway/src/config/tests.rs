@@ -128,7 +128,8 @@ fn defaults_are_those_of_the_documentation() {
                     acknowledges: true,
                     modes: None,
                     rated: None,
-                    hot_plug: false
+                    hot_plug: false,
+                    startup: Vec::new(),
                 },
                 Drive {
                     name: "b".to_owned(),
@@ -137,7 +138,8 @@ fn defaults_are_those_of_the_documentation() {
                     acknowledges: true,
                     modes: None,
                     rated: None,
-                    hot_plug: false
+                    hot_plug: false,
+                    startup: Vec::new(),
                 },
             ],
         })

@@ -31,6 +31,7 @@ use super::bus::can::trial::Tried;
 use super::bus::devicenet::end::MessageError;
 use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
+use super::bus::startup::{StartupFailure, StartupReport};
 use super::device::scaling::ScalingRefusal;
 use super::phase_lock::{LockState, Phase as LockPhase};
 use crate::mapping::{
@@ -97,6 +98,20 @@ pub enum Notice {
         address: u16,
         /// What failed.
         failure: StepFailure,
+    },
+    /// Something has happened to an entry of the start-up list of a drive.
+    Startup {
+        /// Number of the axis: its place in the configuration, from 0.
+        axis: u8,
+        /// What.
+        report: StartupReport,
+    },
+    /// The start-up list of a drive did not come through; the drive is left out.
+    StartupFailed {
+        /// Number of the axis: its place in the configuration, from 0.
+        axis: u8,
+        /// Why, and how far it came.
+        failure: StartupFailure,
     },
     /// Steps failed that may fail.
     PassedOver {
@@ -364,6 +379,7 @@ impl Notice {
     #[must_use]
     pub fn severity(&self) -> Severity {
         match self {
+            Self::Startup { report, .. } if !report.is_warning() => Severity::Info,
             Self::Sercos(Event::Connection { .. }) => Severity::Detail,
             Self::Progress { .. }
             | Self::PhaseLock { .. }
@@ -428,6 +444,8 @@ impl Notice {
             | Self::Node { .. } => None,
             Self::DriveMissing { axis, .. }
             | Self::Commissioning { axis, .. }
+            | Self::Startup { axis, .. }
+            | Self::StartupFailed { axis, .. }
             | Self::PassedOver { axis, .. }
             | Self::SlaveSetup { axis, .. }
             | Self::NodeCommissioning { axis, .. }
@@ -473,6 +491,10 @@ impl fmt::Display for Notice {
                     f,
                     "commissioning of the drive with SERCOS address {address} failed: {failure}; it is left out"
                 )
+            }
+            Self::Startup { report, .. } => write!(f, "{report}"),
+            Self::StartupFailed { failure, .. } => {
+                write!(f, "the start-up list of the drive failed: {failure}; the drive is left out")
             }
             Self::Can { bus, event } => {
                 write!(f, "CAN bus {}: {event}", bus + 1)?;

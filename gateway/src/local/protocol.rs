@@ -15,11 +15,11 @@ use profile_generic::parameter::{Access, Parameter};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 
-use super::drive::id::Id;
 use super::drive::job::Ask;
 use crate::config::AxisKind;
 use crate::engine::local::{Failure, Generator, Jog, Move, Order};
 use crate::mapping::Mapping;
+use crate::parameter::id::Id;
 use crate::status::AxisStatus;
 
 /// Longest request, bytes; what is longer is refused and skipped. A value of 2000 bytes fits, written as `hex:`.

@@ -20,13 +20,13 @@ use tokio::sync::mpsc;
 use tracing::{info, warn};
 
 use super::drive::job::{Ask, Context, Job, Step};
-use super::drive::known::Catalogue;
 use super::overview::{Known, Overview};
 use super::protocol::{self, BadRequest, LINE_MAX, NamedParameter};
 use crate::config::{AxisKind, TimeSource};
 use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
 use crate::latest::Reader;
+use crate::parameter::known::Catalogue;
 use crate::status::BoxStatus;
 use crate::time::source::TimeView;
 
@@ -468,13 +468,13 @@ mod tests {
     use profile_sercos::wire::svc::Element;
     use tokio::io::{AsyncBufReadExt as _, BufReader};
 
-    use super::super::drive::known::Bus;
     use super::*;
     use crate::engine::direct::{DirectFailure, Direction, Target};
     use crate::engine::local::Failure;
     use crate::engine::parameter::ParameterFailure;
     use crate::latest::latest;
     use crate::mapping::Mapping;
+    use crate::parameter::known::Bus;
     use crate::status::tests::distinct;
     use crate::time::ptp::FollowerConfig;
     use crate::time::status::TimeStatus;

@@ -128,6 +128,33 @@ impl Cia402Tables {
         Ok(steps)
     }
 
+    /// The objects that commissioning writes into the drive of an axis, as the tables have them: others have no say in them. What
+    /// the axis arms its captures by is among them.
+    pub(crate) fn written(&self, axis: &Cia402Axis) -> Vec<Object> {
+        let mut objects = Vec::new();
+        for rule in &self.steps {
+            match &rule.kind {
+                StepKind::Write(value, _) => objects.push(value.object),
+                StepKind::WriteParameter(parameter) => {
+                    let has_value = axis.parameters.iter().any(|(known, _)| known == parameter);
+                    let rules =
+                        self.parameters.iter().filter(|rule| has_value && rule.parameter == *parameter);
+                    for ParameterRule { at, .. } in rules {
+                        let others = at.inverted.iter().chain(&at.common);
+                        objects.extend(std::iter::once(&at.value).chain(others).map(|value| value.object));
+                    }
+                }
+                StepKind::WriteCycle(value, exponent) => objects.extend([value.object, exponent.object]),
+                StepKind::WriteMode => objects.push(self.words.mode),
+                _ => {}
+            }
+        }
+        objects.extend(self.capture_objects(axis));
+        objects.sort_unstable();
+        objects.dedup();
+        objects
+    }
+
     /// The time between set-points that a drive expects, where it is another one than the cycle.
     pub(crate) fn other_period(&self, axis: &Cia402Axis, facts: &ObjectFacts) -> Option<InterpolationPeriod> {
         let (value, exponent) = self.steps.iter().find_map(|rule| match &rule.kind {

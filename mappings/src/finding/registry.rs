@@ -490,6 +490,14 @@ registry! {
         "A step of a script for the simulated controller, or an event of a script for simulated drives, is unknown or cannot be executed.",
         "[[step]]\nenabel = 1",
         "Correct the step. docs/reference/scripts.md lists the steps, and docs/tasks/simulate-drives-and-controllers.md the events.";
+    STARTUP = 96 Error "an entry of a start-up list that cannot be used":
+        "The start-up list of a drive says what its parameters have to be before it takes part in the cycle. The entry is for another kind of drive or another axis, its value cannot be that of the parameter, nobody says the type of the object, or it names what Axisbridge itself writes: cyclic values, communication, operation modes, and what the tables write at commissioning.",
+        "[[south.sercos.drive.startup]]\nparameter = \"S-0-0047\"\nvalue = 0",
+        "Correct the entry, or remove it. docs/tasks/set-drive-parameters-at-start.md says which key sets what Axisbridge writes.";
+    STARTUP_ODD = 97 Warning "an entry of a start-up list with something odd":
+        "The backup that is used as a start-up list has parameters that Axisbridge sets itself, which are left out of the list, or parameters that could not be read when it was made; or the value of an entry does not fit what the dictionary says of the parameter, where the drive may say otherwise.",
+        "[[south.sercos.drive]]\nstartup_file = \"drive-a.toml\" # with S-0-0032",
+        "Nothing if the list is as you meant it. Otherwise correct it.";
 }
 
 #[cfg(test)]

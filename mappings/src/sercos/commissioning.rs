@@ -121,6 +121,32 @@ impl CommissioningPlan {
     }
 }
 
+impl SercosTables {
+    /// The IDNs that commissioning writes into the drive of an axis, in order: others have no say in them. What the axis arms its
+    /// captures by is among them.
+    pub(crate) fn written(&self, axis: &SercosAxis) -> Vec<Idn> {
+        let mut idns = Vec::new();
+        for rule in self.steps.iter().filter(|rule| applies(rule, axis)) {
+            match rule.kind {
+                StepKind::WriteValue(idn, _) => idns.push(idn),
+                StepKind::WriteParameter(parameter) => {
+                    let has_value = axis.parameters.iter().any(|(known, _)| *known == parameter);
+                    let rule = self.parameters.iter().find(|rule| has_value && rule.parameter == parameter);
+                    idns.extend(rule.map(|rule| rule.at.idn));
+                }
+                StepKind::WriteModes => idns.extend(self.slots.iter().map(|slot| slot.idn)),
+                _ => {}
+            }
+        }
+        if axis.captures != CaptureMode::Off {
+            idns.extend(captures::idns(self));
+        }
+        idns.sort_unstable();
+        idns.dedup();
+        idns
+    }
+}
+
 fn applies(rule: &StepRule, axis: &SercosAxis) -> bool {
     rule.axis.is_none_or(|kind| kind == axis.units.kind)
         && rule.modulo.is_none_or(|modulo| modulo == axis.modulo)

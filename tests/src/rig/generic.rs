@@ -8,6 +8,7 @@ use axisbridge::engine::build::can::{Network, network};
 use axisbridge::engine::build::sercos::master_config;
 use axisbridge::engine::bus::can::CanBus;
 use axisbridge::engine::bus::sercos::SercosBus;
+use axisbridge::engine::bus::sercos::commissioner::DriveSetup;
 use axisbridge::engine::bus::{AnyBus, Buses, can, sercos};
 use axisbridge::engine::notice::Notice;
 use axisbridge::engine::port::SouthPort;
@@ -202,8 +203,9 @@ impl GenericRig {
         prepare(&mut needs, &mut line);
         // No drive comes later.
         let (_, commissioner) = sercos::commissioner::commissioner(mapping(), 0, []);
-        let bus = SercosBus::new(master, vec![(0, ADDRESS, needs)], commissioner)
-            .expect("the master's configuration is sound");
+        let drive = DriveSetup { axis: 0, address: ADDRESS, needs, startup: Vec::new() };
+        let bus =
+            SercosBus::new(master, vec![drive], commissioner).expect("the master's configuration is sound");
         let south = SercosSouth { line, queue: SouthQueue::default() };
         Self::on(AnyBus::Sercos(Box::new(bus)), south, limits)
     }

@@ -36,6 +36,7 @@ mod reconnect;
 mod scaling;
 mod scripts;
 mod stalled;
+mod startup_lists;
 mod stopping;
 mod torque;
 mod trims;

@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::At;
 use crate::cli::CliError;
 use crate::cli::gateway_client::GatewayClient;
-use crate::local::drive::id::Id;
 use crate::local::drive::job::ParameterReport;
+use crate::parameter::id::Id;
 
 /// How long a drive may take for a request: several accesses, each of which the gateway gives up after a second or so.
 const PATIENCE: Duration = Duration::from_secs(30);

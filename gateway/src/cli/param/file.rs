@@ -7,16 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::drive::{Drive, Found, Refused};
 use crate::cli::CliError;
-use crate::local::drive::id::Id;
 use crate::local::drive::job::ParameterReport;
-use crate::local::drive::value::unhex;
+use crate::parameter::backup::{BYTES_MAX, FORMAT, questions};
+use crate::parameter::id::Id;
+use crate::parameter::value::unhex;
 use crate::replace_file::replace_file;
-
-/// The format of the files that are written, and the only one that is read.
-const FORMAT: u32 = 1;
-
-/// Longest file, bytes.
-const BYTES_MAX: u64 = 64 * 1_024 * 1_024;
 
 /// The first line of a file.
 const HEAD: &str = "# Parameters of a drive, written by `axisbridge param backup`. `restore` and `compare` use `data`: the bytes of the drive.\n\n";
@@ -81,45 +76,14 @@ impl From<ParameterReport> for Kept {
     }
 }
 
-/// What a drive is asked about itself: what it is called, its number, and whether drives of one type agree in it.
-const SERCOS: &[(&str, &str, bool)] = &[
-    ("vendor_name", "S-0-1300.0.2", false),
-    ("vendor_code", "S-0-1300.0.3", true),
-    ("device_name", "S-0-1300.0.4", false),
-    ("device_id", "S-0-1300.0.5", true),
-    ("hardware_revision", "S-0-1300.0.8", false),
-    ("software_revision", "S-0-1300.0.9", false),
-    ("serial_number", "S-0-1300.0.12", false),
-    ("firmware", "S-0-0030", false),
-    ("controller_type", "S-0-0140", true),
-];
-const CANOPEN: &[(&str, &str, bool)] = &[
-    ("device_type", "1000:00", true),
-    ("device_name", "1008:00", false),
-    ("hardware_version", "1009:00", false),
-    ("software_version", "100A:00", false),
-    ("vendor", "1018:01", true),
-    ("product", "1018:02", true),
-    ("revision", "1018:03", false),
-    ("serial_number", "1018:04", false),
-];
-const DEVICENET: &[(&str, &str, bool)] = &[
-    ("vendor", "1.1.1", true),
-    ("device_type", "1.1.2", true),
-    ("product_code", "1.1.3", true),
-    ("revision", "1.1.4", false),
-    ("serial_number", "1.1.6", false),
-    ("product_name", "1.1.7", false),
-];
-
 impl Identity {
     /// What a drive says about itself. It need not have all of it.
     pub fn of(drive: &mut Drive, bus: &str) -> Result<Self, CliError> {
         let mut identity = Self::default();
-        for (key, id, _) in questions(bus) {
-            match drive.read(id, true)? {
+        for question in questions(bus) {
+            match drive.read(question.id, true)? {
                 Found::Report(report) => {
-                    identity.0.insert((*key).to_owned(), report.value);
+                    identity.0.insert(question.key.to_owned(), report.value);
                 }
                 Found::Refused(refused) if refused.ends_all() => return Err(refused.text.into()),
                 Found::Refused(_) => {}
@@ -130,20 +94,12 @@ impl Identity {
 
     /// In what two drives are of another type: what it is called, and what they say.
     pub fn differences<'a>(&'a self, other: &'a Self, bus: &str) -> Vec<(&'static str, &'a str, &'a str)> {
-        let of_type = questions(bus).iter().filter(|(.., of_type)| *of_type);
-        let pairs = of_type.map(|(key, ..)| {
-            let text = |identity: &'a Self| identity.0.get(*key).map_or("nothing", String::as_str);
-            (*key, text(self), text(other))
+        let of_type = questions(bus).iter().filter(|question| question.of_type);
+        let pairs = of_type.map(|question| {
+            let text = |identity: &'a Self| identity.0.get(question.key).map_or("nothing", String::as_str);
+            (question.key, text(self), text(other))
         });
         pairs.filter(|(_, one, other)| one != other).collect()
-    }
-}
-
-fn questions(bus: &str) -> &'static [(&'static str, &'static str, bool)] {
-    match bus {
-        "sercos" => SERCOS,
-        "canopen" => CANOPEN,
-        _ => DEVICENET,
     }
 }
 

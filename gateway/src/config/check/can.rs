@@ -9,7 +9,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 
 use super::value::NANO;
-use super::{Problems, can_device, value};
+use super::{Problems, can_device, startup, value};
 use crate::config::file::{CanDriveTable, CanTable, CountsTable};
 use crate::config::{Can, CanDrive, CanLink, duration};
 use crate::finding::registry as code;
@@ -213,6 +213,7 @@ fn check_drive(problems: &mut Problems, table: &CanDriveTable) -> Option<CanDriv
         None => Some(Vec::new()),
         Some(counts) => check_counts(problems, counts),
     };
+    let startup = startup::can(problems, table);
     Some(CanDrive {
         name: name?,
         node: NodeId::new(node?).ok()?,
@@ -225,6 +226,7 @@ fn check_drive(problems: &mut Problems, table: &CanDriveTable) -> Option<CanDriv
         drive_modes: drive_modes?,
         way_of_a_turn: way_of_a_turn?,
         counts: counts?,
+        startup: startup?,
     })
 }
 

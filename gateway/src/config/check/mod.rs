@@ -14,6 +14,7 @@ mod problems;
 mod realtime;
 mod references;
 pub(super) mod sercos;
+pub(super) mod startup;
 pub(super) mod time;
 mod value;
 

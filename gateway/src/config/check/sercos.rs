@@ -4,7 +4,7 @@ use profile_generic::time::DurationNs;
 use profile_sercos::master::config::{AddressPolicy, MasterConfig};
 
 use super::can::check_modes;
-use super::{Problems, names, value};
+use super::{Problems, names, startup, value};
 use crate::config::file::{DriveTable, SercosTable};
 use crate::config::{Drive, Link, Sercos, duration, rated};
 use crate::finding::Spanned;
@@ -166,6 +166,7 @@ fn check_drive(problems: &mut Problems, table: &DriveTable) -> Option<Drive> {
         })
     });
     let modes = value::optional(&table.modes, |names| check_modes(problems, names));
+    let startup = startup::sercos(problems, table);
     Some(Drive {
         name: name?,
         address: address?,
@@ -174,6 +175,7 @@ fn check_drive(problems: &mut Problems, table: &DriveTable) -> Option<Drive> {
         modes: modes?,
         rated: rated?,
         hot_plug: table.hot_plug.as_ref().is_some_and(|hot_plug| *hot_plug.get_ref()),
+        startup: startup?,
     })
 }
 

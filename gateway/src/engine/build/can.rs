@@ -6,7 +6,7 @@ use profile_cia402::master::config::{
 use profile_cia402::wire::NodeId;
 use profile_generic::mode::OperatingMode;
 
-use super::{BuildError, kind, modes, parameters};
+use super::{BuildError, kind, modes, parameters, startup};
 use crate::config::{Axis, AxisFunction, Can, CanDevice, CanDrive, CanLink, Config, DriveAt, Lss};
 use crate::engine::bus::can::CanBus;
 use crate::engine::bus::can::commissioner::{AxisSetup, Commissioner, commissioner, pdos};
@@ -71,7 +71,8 @@ pub fn network(config: &Config, place: usize, mapping: &Mapping) -> Result<Netwo
             known.rpdos.extend(receive);
             known.tpdos.extend(transmit);
         }
-        let setup = AxisSetup { axis: number, needs, pdos: axis_pdos };
+        let startup = startup::of_can(bus, drive, &needs, mapping);
+        let setup = AxisSetup { axis: number, needs, pdos: axis_pdos, startup };
         match devices.iter_mut().find(|(node, _)| *node == drive.node) {
             Some((_, axes)) => axes.push(setup),
             None => devices.push((drive.node, vec![setup])),

@@ -3,6 +3,7 @@
 pub mod can;
 pub mod devicenet;
 pub mod sercos;
+pub mod startup;
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::net::Ipv4Addr;

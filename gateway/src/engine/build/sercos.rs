@@ -4,9 +4,9 @@ use profile_generic::mode::OperatingMode;
 use profile_sercos::master::config::{Connections, MasterConfig, Ports, SlaveConfig};
 use profile_sercos::master::layout::{ConnectionNeed, SlaveNeed};
 
-use super::{BuildError, Host, kind, modes, parameters};
+use super::{BuildError, Host, kind, modes, parameters, startup};
 use crate::config::{Axis, AxisFunction, AxisKind, Config, Drive, Sercos, TimeSource};
-use crate::engine::bus::sercos::commissioner::{Commissioner, commissioner};
+use crate::engine::bus::sercos::commissioner::{Commissioner, DriveSetup, commissioner};
 use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION, SercosBus};
 use crate::mapping::{AxisUnits, Mapping, Reference, SercosAxis};
 
@@ -53,8 +53,12 @@ pub(super) fn bus(
             slave.hot_plug = Some(room(&needs(axis, drive), mapping));
         }
     }
-    let drives: Vec<_> =
-        drives.iter().map(|(number, axis, drive)| (*number, drive.address, needs(axis, drive))).collect();
+    let drives = drives.iter().map(|(number, axis, drive)| {
+        let needs = needs(axis, drive);
+        let startup = startup::of_sercos(&drive.startup, &needs, mapping);
+        DriveSetup { axis: *number, address: drive.address, needs, startup }
+    });
+    let drives: Vec<_> = drives.collect();
     let (commissioner, end) = commissioner(mapping.clone(), master.mst_losses, drives.iter().cloned());
     Ok((SercosBus::new(master, drives, end)?, commissioner))
 }

@@ -9,6 +9,7 @@ pub mod commissioner;
 pub mod devicenet;
 mod direct_slot;
 pub mod sercos;
+pub mod startup;
 mod transmit_queue;
 
 use std::fmt;

@@ -13,11 +13,11 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 use serde::{Deserialize, Serialize};
 
-use super::id::Id;
-use super::known::{Bus, Catalogue, belongs_to_gateway, rescales};
-use super::value::{Kind, hex};
 use crate::engine::direct::{DATA_MAX, DirectAnswer, DirectFailure, Direction, Target};
 use crate::local::protocol::{NamedParameter, parameter_lines, printable};
+use crate::parameter::id::Id;
+use crate::parameter::known::{Bus, Catalogue, belongs_to_gateway, rescales};
+use crate::parameter::value::{Kind, hex};
 
 /// Longest name, unit or limit that is shown, bytes.
 const ELEMENT_MAX: usize = 1_024;
@@ -36,7 +36,7 @@ pub enum Ask {
     Write {
         /// The parameter.
         id: Id,
-        /// The value, as [`super::value`] reads it.
+        /// The value, as [`crate::parameter::value`] reads it.
         text: String,
     },
     /// The parameters that are known.

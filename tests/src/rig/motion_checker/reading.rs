@@ -198,7 +198,10 @@ pub fn sercos(slave: &Slave<Drive>, scaling: &Scaling) -> Option<Reading> {
 pub fn canopen_scaling(node: &DriveNode, offset: u16, way: Option<Ratio>) -> Option<Scaling> {
     let dictionary = node.dictionary();
     let scales = Cia402Scales::read(dictionary, offset)?;
-    let (many, way) = (f64_from_i64(MANY), factor(way));
+    // Turns of the load in one of the motor.
+    let gear = |sub| dictionary.number(index::GEAR_RATIO + offset, sub);
+    let gear = if gear(1) > 0 && gear(2) > 0 { f64_from_i64(gear(2)) / f64_from_i64(gear(1)) } else { 1.0 };
+    let (many, way) = (f64_from_i64(MANY), factor(way) * gear);
     let limit = |sub| dictionary.number(index::RANGE_LIMIT + offset, sub);
     // Position objects of both directions have the same polarity.
     let position = f64_from_i64(scales.position.servo(MANY));

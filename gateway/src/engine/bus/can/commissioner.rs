@@ -1,5 +1,5 @@
-//! The commissioning of CANopen devices: for each axis of a device what it is asked and written, and its program; then the PDOs of
-//! the device. Several requests are under way at a time. Where a device keeps its mapping, its PDOs are read first.
+//! The commissioning of CANopen devices: the start-up lists of its axes; for each axis of a device what it is asked and written,
+//! and its program; then the PDOs of the device. Several requests are under way at a time. Where a device keeps its mapping, its PDOs are read first.
 
 use std::collections::VecDeque;
 
@@ -13,11 +13,15 @@ use super::failure::{Misfit, StepFailure};
 use super::layout::{AxisPdos, FoundPdos, NotMapped, PdoMap, object};
 use super::readback::Readback;
 use super::trial::Trial;
+use crate::engine::bus::startup::{StartupAccess, StartupRun, When};
+use crate::engine::direct::DirectFailure;
 use crate::engine::notice::Notice;
 use crate::mapping::{
     Cia402Axis, Cia402Dictionary, Cia402Error, DriveIdentity, DriveProgram, Item, Mapping, Object,
     ObjectFacts, ObjectStep, Plan,
 };
+use crate::parameter::id::Id;
+use crate::parameter::startup::StartupEntry;
 
 /// Messages under way in each direction.
 const QUEUE: usize = 128;
@@ -56,11 +60,15 @@ pub struct AxisSetup {
     pub needs: Cia402Axis,
     /// The PDOs that it may have.
     pub pdos: AxisPdos,
+    /// The start-up list of its drive.
+    pub startup: Vec<StartupEntry>,
 }
 
 /// What is done with an axis.
 #[derive(Debug)]
 enum Task {
+    /// The start-up list of its drive: those of all axes come before anything is read.
+    List(StartupRun),
     /// A plan of the tables.
     Plan(Plan),
     /// Modes of operation are tried, of a drive that does not report them.
@@ -147,6 +155,11 @@ impl Work for DeviceWork {
     }
 
     fn handle(&mut self, outcome: &SdoOutcome, context: &mut Context) {
+        if let Some((_, Task::List(list))) = &mut self.at {
+            let read = outcome.result.map(|()| (None, outcome.data.as_slice()));
+            list.take(read.map_err(DirectFailure::Sdo));
+            return self.advance_list(context);
+        }
         if let Some((place, Task::Try(trial))) = &mut self.at {
             let place = *place;
             match trial.handle(outcome) {
@@ -224,7 +237,42 @@ impl DeviceWork {
             context.out.push_back(Done::Told(Notice::Family { axis, node, identity, name }));
         }
         self.pdos = [Vec::new(), Vec::new()];
-        self.set_out(0, Plan::Ask, context);
+        self.begin_list(0, context);
+    }
+
+    /// Begins with the start-up list of an axis, or of the next one that has one; behind the last one with the plans.
+    fn begin_list(&mut self, first: usize, context: &mut Context) {
+        let next = (first..self.axes.len()).find(|place| !self.axes[*place].startup.is_empty());
+        let Some(place) = next else { return self.set_out(0, Plan::Ask, context) };
+        let mut list = StartupRun::new(&self.axes[place].startup);
+        list.begin(When::Once);
+        self.at = Some((place, Task::List(list)));
+        self.advance_list(context);
+    }
+
+    /// Asks what is next of a start-up list.
+    fn advance_list(&mut self, context: &mut Context) {
+        let Some((place, Task::List(list))) = &mut self.at else { return };
+        let place = *place;
+        let request = loop {
+            let Some(access) = list.next() else { break None };
+            match list_request(access) {
+                Some(request) => break Some(request),
+                None => list.take(Err(DirectFailure::OtherBus)),
+            }
+        };
+        let (reports, failure) = (list.take_reports(), list.take_failure());
+        let axis = self.number(place);
+        let told = reports.into_iter().map(|report| Done::Told(Notice::Startup { axis, report }));
+        context.out.extend(told);
+        match (failure, request) {
+            (Some(failure), _) => {
+                context.out.push_back(Done::Failed(self.run, Notice::StartupFailed { axis, failure }));
+                self.give_up();
+            }
+            (None, Some(request)) => context.out.push_back(Done::Submit(self.run, request)),
+            (None, None) => self.begin_list(place + 1, context),
+        }
     }
 
     /// Begins a plan of an axis.
@@ -285,7 +333,7 @@ impl DeviceWork {
         let is_through = match &self.at {
             Some((_, Task::Readback(readback))) => readback.under_way() == 0,
             Some((_, Task::Plan(_))) => self.sent.is_empty(),
-            Some((_, Task::Try(_))) | None => false,
+            Some((_, Task::Try(_) | Task::List(_))) | None => false,
         };
         if is_through && let Some((place, task)) = self.at.take() {
             self.through(place, task, context);
@@ -300,6 +348,7 @@ impl DeviceWork {
                 return self.advance(context);
             }
             Task::Plan(_) => None,
+            Task::List(_) => return self.begin_list(place + 1, context),
             Task::Readback(readback) => Some(readback.found()),
             Task::Try(trial) => return self.tried(place, trial, context),
         };
@@ -393,6 +442,20 @@ impl DeviceWork {
         context.shared.mapping.of_drive(&self.facts).cia402_has_modes(&mut self.facts, tried.codes());
         context.out.push_back(Done::Told(Notice::ModesTried { axis, node, tried }));
         self.set_out(place, Plan::Tell, context);
+    }
+}
+
+/// A request of a start-up list; `None` for what no CANopen drive has.
+fn list_request(access: StartupAccess) -> Option<SdoRequest> {
+    let mux = |object: Object| Mux::new(object.index, object.sub);
+    match access {
+        StartupAccess::Read(Id::Object(object), room) => {
+            Some(SdoRequest::upload_into(mux(object), Vec::with_capacity(room)))
+        }
+        StartupAccess::Write(Id::Object(object), _, bytes) => {
+            Some(SdoRequest::download(mux(object), SdoData::Buffer(bytes)))
+        }
+        StartupAccess::Read(..) | StartupAccess::Write(..) => None,
     }
 }
 

@@ -1,20 +1,39 @@
 //! The commissioning of SERCOS drives: what a drive is asked and written in CP2 and in CP3, and what follows from that.
 //!
+//! In either phase the start-up list of the drive comes first, so that what is read is what holds.
+//!
 //! While the whole bus comes up the cycle thread does this itself, because nothing moves yet ([`Setup::poll`]). A drive that comes
 //! by hot plug is commissioned alongside the cycle ([`DriveWork`]).
 
 use profile_sercos::master::config::Connections;
-use profile_sercos::master::svc::request::{SvcOutcome, SvcRequest};
+use profile_sercos::master::svc::request::{Shape, SvcData, SvcOutcome, SvcRequest};
 use profile_sercos::wire::header::Phase;
 
 use super::commissioning::{Commissioning, StepFailure};
 use super::{connections, limitations};
 use crate::engine::bus::commissioner::{CommissionerHandle, Context, Done, Run, Work};
+use crate::engine::bus::startup::{StartupAccess, StartupRun, When};
+use crate::engine::direct::DirectFailure;
 use crate::engine::notice::Notice;
 use crate::mapping::{DriveFacts, DriveProgram, Mapping, SercosAxis, SercosError, Step};
+use crate::parameter::id::Id;
+use crate::parameter::startup::StartupEntry;
 
 /// Messages under way in each direction.
 const QUEUE: usize = 64;
+
+/// A drive that is to be commissioned.
+#[derive(Debug, Clone)]
+pub struct DriveSetup {
+    /// Number of its axis.
+    pub axis: usize,
+    /// Its SERCOS address.
+    pub address: u16,
+    /// What the commissioning has to achieve.
+    pub needs: SercosAxis,
+    /// Its start-up list.
+    pub startup: Vec<StartupEntry>,
+}
 
 /// What the setup of a drive has come to.
 #[derive(Debug)]
@@ -46,6 +65,13 @@ pub struct Setup<T> {
     /// Values in a row that either end of a connection may miss, S-0-1050.x.11.
     allowed_losses: u16,
     phase: Phase,
+    startup: StartupRun,
+    /// The request of the start-up list that is under way.
+    asked: Option<T>,
+    /// The start-up list of this phase is under way.
+    lists: bool,
+    /// What CP2 has read is read again: the start-up list has written since.
+    rereads: bool,
     plan: Option<Commissioning<T>>,
     /// Steps that the drive did not take and need not, until they are reported.
     passed_over: Vec<StepFailure>,
@@ -54,11 +80,16 @@ pub struct Setup<T> {
 impl<T: Copy + PartialEq> Setup<T> {
     /// The setup of the drive of an axis.
     #[must_use]
-    pub fn new(axis: usize, address: u16, needs: SercosAxis, allowed_losses: u16) -> Self {
+    pub fn new(drive: DriveSetup, allowed_losses: u16) -> Self {
+        let DriveSetup { axis, address, needs, startup } = drive;
         Self {
             axis: super::index(axis),
             address,
             needs,
+            startup: StartupRun::new(&startup),
+            asked: None,
+            lists: false,
+            rereads: false,
             facts: DriveFacts::new(),
             unfit: false,
             allowed_losses,
@@ -73,17 +104,31 @@ impl<T: Copy + PartialEq> Setup<T> {
         self.facts = DriveFacts::new();
         self.facts.note_fixed_connections(fixed);
         self.passed_over.clear();
+        self.startup.restart();
     }
 
-    /// Begins the plan of a phase.
+    /// Begins a phase: with the start-up list, then with the plan of the tables.
     ///
     /// # Errors
     /// The tables make no plan for this drive.
     #[expect(clippy::result_large_err, reason = "in the cycle thread, where boxing would allocate")]
     pub fn begin(&mut self, mapping: &Mapping, phase: Phase) -> Result<(), Notice> {
+        self.give_up();
         self.phase = phase;
+        self.startup.begin(if phase == Phase::CP2 { When::Cp2 } else { When::Cp3 });
+        self.lists = !self.startup.is_done();
+        if self.lists { Ok(()) } else { self.begin_plan(mapping) }
+    }
+
+    /// Begins the plan of the phase.
+    #[expect(clippy::result_large_err, reason = "in the cycle thread, where boxing would allocate")]
+    fn begin_plan(&mut self, mapping: &Mapping) -> Result<(), Notice> {
+        let phase = if self.rereads { Phase::CP2 } else { self.phase };
         match mapping.commissioning(&self.needs, phase.0, &self.facts) {
             Ok(mut plan) => {
+                if self.rereads {
+                    plan.steps.retain(|step| matches!(step, Step::Read { .. }));
+                }
                 if self.unfit {
                     plan.steps.retain(|step| !matches!(step, Step::Command { .. }));
                 }
@@ -101,17 +146,58 @@ impl<T: Copy + PartialEq> Setup<T> {
     /// Whether a request is under way.
     #[must_use]
     pub fn is_waiting(&self) -> bool {
-        self.plan.as_ref().is_some_and(Commissioning::is_waiting)
+        self.asked.is_some() || self.plan.as_ref().is_some_and(Commissioning::is_waiting)
     }
 
-    /// Ends the plan under way.
+    /// Ends what is under way.
     pub fn give_up(&mut self) {
         self.plan = None;
+        self.startup.give_up();
+        (self.asked, self.lists, self.rereads) = (None, false, false);
     }
 
-    /// Takes an outcome if it is one of the plan's; `false` when it is another's.
+    /// Takes an outcome if it is of this setup; `false` when it is another's.
     pub fn handle(&mut self, ticket: T, outcome: &SvcOutcome) -> bool {
+        if self.asked == Some(ticket) {
+            self.asked = None;
+            let data = outcome.data.as_slice();
+            let read = outcome.result.map(|reply| (reply.attribute, data));
+            self.startup.take(read.map_err(DirectFailure::Svc));
+            return true;
+        }
         self.plan.as_mut().is_some_and(|plan| plan.handle(ticket, outcome, &mut self.facts))
+    }
+
+    /// Submits what is next of the start-up list; what follows from it when it is through.
+    fn poll_list(
+        &mut self,
+        mapping: &Mapping,
+        submit: &mut dyn FnMut(SvcRequest) -> Option<T>,
+        notice: &mut dyn FnMut(Notice),
+    ) -> Progress {
+        if self.asked.is_none()
+            && let Some(access) = self.startup.next()
+        {
+            match request(access) {
+                // When the queue is full or the phase changes it is tried again in the next cycle.
+                Some(request) => self.asked = submit(request),
+                None => self.startup.take(Err(DirectFailure::OtherBus)),
+            }
+        }
+        for report in self.startup.take_reports() {
+            notice(Notice::Startup { axis: self.axis, report });
+        }
+        if let Some(failure) = self.startup.take_failure() {
+            self.unfit = true;
+            self.lists = false;
+            return Progress::Failed(Notice::StartupFailed { axis: self.axis, failure });
+        }
+        if !self.startup.is_done() {
+            return Progress::Busy;
+        }
+        self.lists = false;
+        self.rereads = self.phase != Phase::CP2 && self.startup.has_written();
+        self.begin_plan(mapping).map_or_else(Progress::Failed, |()| Progress::Busy)
     }
 
     /// Submits what is next; when the plan is through, says what follows from it. `None` while there is no plan.
@@ -121,16 +207,25 @@ impl<T: Copy + PartialEq> Setup<T> {
         submit: &mut dyn FnMut(SvcRequest) -> Option<T>,
         notice: &mut dyn FnMut(Notice),
     ) -> Option<Progress> {
+        if self.lists {
+            return Some(self.poll_list(mapping, submit, notice));
+        }
         let plan = self.plan.as_mut()?;
         plan.poll(submit);
         if !plan.is_done() {
             return Some(Progress::Busy);
         }
         let (failure, more) = (plan.failure(), plan.wants_more());
-        self.passed_over.append(&mut plan.take_passed_over());
-        if more {
-            // What the drive has reported leads to further steps of the same phase: they begin with the next call.
-            return Some(self.begin(mapping, self.phase).map_or_else(Progress::Failed, |()| Progress::Busy));
+        let mut passed_over = plan.take_passed_over();
+        // What is read again was passed over in CP2.
+        if !self.rereads {
+            self.passed_over.append(&mut passed_over);
+        }
+        if more || (self.rereads && failure.is_none()) {
+            // What the drive has reported leads to further steps of the same phase, or what was read again to those of this one:
+            // they begin with the next call.
+            self.rereads &= more;
+            return Some(self.begin_plan(mapping).map_or_else(Progress::Failed, |()| Progress::Busy));
         }
         self.plan = None;
         let last = failure.is_some() || self.phase != Phase::CP2;
@@ -171,6 +266,24 @@ impl<T: Copy + PartialEq> Setup<T> {
     }
 }
 
+/// A request of a start-up list; `None` for what no SERCOS drive has.
+fn request(access: StartupAccess) -> Option<SvcRequest> {
+    match access {
+        StartupAccess::Read(Id::Idn(idn), room) => {
+            Some(SvcRequest::read(idn).with_buffer(Vec::with_capacity(room)))
+        }
+        StartupAccess::Write(Id::Idn(idn), attribute, bytes) => {
+            let request = SvcRequest::write(idn, SvcData::Buffer(bytes));
+            let shape = attribute.map(|attribute| match attribute.is_list() {
+                true => Shape::List,
+                false => Shape::Fixed(attribute.item_length().bytes()),
+            });
+            Some(SvcRequest { shape, ..request })
+        }
+        StartupAccess::Read(..) | StartupAccess::Write(..) => None,
+    }
+}
+
 /// What the cycle thread orders: to set up a drive as in this phase.
 #[derive(Debug, Clone, Copy)]
 pub struct Order {
@@ -202,18 +315,14 @@ pub struct DriveWork {
 /// Commissions drives that come while others move.
 pub type Commissioner = crate::engine::bus::commissioner::Commissioner<DriveWork>;
 
-/// A commissioner for these drives, number, address and needs of each axis, and the cycle thread's end.
+/// A commissioner for these drives, and the cycle thread's end.
 #[must_use]
 pub fn commissioner(
     mapping: Mapping,
     allowed_losses: u16,
-    drives: impl IntoIterator<Item = (usize, u16, SercosAxis)>,
+    drives: impl IntoIterator<Item = DriveSetup>,
 ) -> (Commissioner, CommissionerHandle<DriveWork>) {
-    let work = |(axis, address, needs)| DriveWork {
-        run: Run::default(),
-        setup: Setup::new(axis, address, needs, allowed_losses),
-        serial: 0,
-    };
+    let work = |drive| DriveWork { run: Run::default(), setup: Setup::new(drive, allowed_losses), serial: 0 };
     Commissioner::with_queue(QUEUE, mapping, drives.into_iter().map(work).collect())
 }
 

@@ -26,7 +26,7 @@ use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::scp::ScpClass;
 
-use self::commissioner::{DriveWork, Made, Order, Progress as SetupProgress, Setup};
+use self::commissioner::{DriveSetup, DriveWork, Made, Order, Progress as SetupProgress, Setup};
 use self::progress::PhaseProgress;
 use self::recovery::Recovery;
 use super::accesses::Accesses;
@@ -115,14 +115,13 @@ pub struct SercosBus {
 }
 
 impl SercosBus {
-    /// A bus whose master goes for CP4. `drives` are the number of each axis, its SERCOS address and its needs; the
-    /// commissioner knows the same.
+    /// A bus whose master goes for CP4, and its drives; the commissioner knows the same.
     ///
     /// # Errors
     /// What the master finds wrong with its configuration.
     pub fn new(
         config: MasterConfig,
-        drives: Vec<(usize, u16, SercosAxis)>,
+        drives: Vec<DriveSetup>,
         commissioner: CommissionerHandle<DriveWork>,
     ) -> Result<Self, ConfigError> {
         let allowed_losses = config.mst_losses;
@@ -134,13 +133,13 @@ impl SercosBus {
             .collect();
         let mut master = Master::new(config)?;
         master.set_target_phase(Phase::CP4);
-        let drive = |(axis, address, needs)| Drive {
-            axis,
-            setup: Setup::new(axis, address, needs, allowed_losses),
+        let drive = |drive: DriveSetup| Drive {
+            axis: drive.axis,
+            hot_plug: later.contains(&drive.address),
+            setup: Setup::new(drive, allowed_losses),
             slave: None,
             connections: [COMMAND_CONNECTION, FEEDBACK_CONNECTION],
             stage: Stage::Absent,
-            hot_plug: later.contains(&address),
             runs: 0,
             accesses: Accesses::new(),
         };

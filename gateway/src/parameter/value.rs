@@ -236,7 +236,8 @@ fn object_bytes(kind: Cia402Type, text: &str) -> Result<Vec<u8>, ValueError> {
 }
 
 /// Bytes of a number of this type; `None` for texts and bytes.
-fn len(kind: Cia402Type) -> Option<usize> {
+#[must_use]
+pub fn len(kind: Cia402Type) -> Option<usize> {
     let bits = usize::try_from(kind.bits()?).ok()?;
     Some(bits.div_ceil(8))
 }

@@ -6,7 +6,7 @@ use profile_cia402::drive::index::AXIS_OFFSET;
 use profile_sercos::wire::idn::Idn;
 
 use super::id::Id;
-use crate::config::{Config, DriveAt, KnownObject, is_set_by_gateway};
+use crate::config::{Can, CanDrive, Config, DriveAt, KnownObject, is_set_by_gateway};
 use crate::mapping::{Cia402Dictionary, Dictionaries, Mapping, Object};
 
 /// The bus of a drive, with what is known of the drive.
@@ -70,16 +70,9 @@ impl Catalogue {
             DriveAt::Sercos { .. } => Bus::Sercos,
             DriveAt::Devicenet { .. } => Bus::Devicenet,
             DriveAt::Can { .. } => {
-                let drive = config.can_drive(axis);
-                let of_axis = drive.map_or(0, |(_, drive)| drive.axis);
-                let file = drive.and_then(|(bus, drive)| bus.device(drive.node)?.file.as_ref());
-                let (source, objects) = match file.filter(|file| !file.objects.is_empty()) {
-                    Some(file) => (
-                        "file",
-                        file.objects.iter().filter(|known| is_of(known.object, of_axis)).cloned().collect(),
-                    ),
-                    None => ("dictionary", dictionary(mapping, of_axis)),
-                };
+                let (source, objects) = config
+                    .can_drive(axis)
+                    .map_or(("dictionary", Vec::new()), |(bus, drive)| objects(bus, drive, mapping));
                 Bus::Can { source, objects }
             }
         });
@@ -105,8 +98,22 @@ impl Catalogue {
     }
 }
 
+/// What is known of the objects of a CANopen drive and its device, in the order of their numbers, and where that is from.
+#[must_use]
+pub fn objects(bus: &Can, drive: &CanDrive, mapping: &Mapping) -> (&'static str, Vec<KnownObject>) {
+    let file = bus.device(drive.node).and_then(|device| device.file.as_ref());
+    match file.filter(|file| !file.objects.is_empty()) {
+        Some(file) => {
+            let of_axis = file.objects.iter().filter(|known| is_of(known.object, drive.axis));
+            ("file", of_axis.cloned().collect())
+        }
+        None => ("dictionary", dictionary(mapping, drive.axis)),
+    }
+}
+
 /// Whether an object is one of the device, or of this axis of it.
-fn is_of(object: Object, axis: u16) -> bool {
+#[must_use]
+pub fn is_of(object: Object, axis: u16) -> bool {
     match object.index.checked_sub(0x6000) {
         Some(behind) if object.index < 0xA000 => behind / AXIS_OFFSET == axis,
         _ => true,

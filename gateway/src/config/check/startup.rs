@@ -1,0 +1,206 @@
+//! The start-up lists of drives, as far as they can be judged without tables: numbers, words, values of a type, each parameter once.
+
+use super::{Problems, value};
+use crate::config::file::{CanDriveTable, DriveTable};
+use crate::config::scalar::Scalar;
+use crate::finding::registry as code;
+use crate::finding::{Problem, Spanned};
+use crate::mapping::Cia402Type;
+use crate::parameter::id::Id;
+use crate::parameter::startup::{OnDifference, StartupEntry, StartupValue};
+use crate::parameter::value::Kind;
+
+/// Entries of a list.
+const ENTRIES_MAX: usize = 4_096;
+
+/// What an IDN and an object look like.
+const IDN: &str = "an IDN such as \"S-0-0121\", \"P-0-0123\" or \"S-0-1300.0.3\"";
+const OBJECT: &str = "an object such as \"6091:01\", \"0x6091.1\" or \"2001h\"";
+
+/// The list of a SERCOS drive without its file.
+pub(super) fn sercos(problems: &mut Problems, table: &DriveTable) -> Option<Vec<StartupEntry>> {
+    problems.count(&table.startup, "entries of a start-up list", ENTRIES_MAX);
+    file(problems, table.startup_file.as_ref());
+    let usual = word(problems, table.on_startup_difference.as_ref(), OnDifference::default());
+    let mut entries = Vec::with_capacity(table.startup.len());
+    for entry in &table.startup {
+        let entry = entry.get_ref();
+        let id = number(problems, &entry.parameter, IDN, |id| matches!(id, Id::Idn(_)));
+        let on_difference = word(problems, entry.on_difference.as_ref(), usual.unwrap_or_default());
+        entries.push(made(id, &entry.value, None, on_difference));
+    }
+    once(problems, table.startup.iter().map(|entry| &entry.get_ref().parameter), &entries);
+    usual.and(entries.into_iter().collect())
+}
+
+/// The list of a CANopen drive without its file.
+pub(super) fn can(problems: &mut Problems, table: &CanDriveTable) -> Option<Vec<StartupEntry>> {
+    problems.count(&table.startup, "entries of a start-up list", ENTRIES_MAX);
+    file(problems, table.startup_file.as_ref());
+    let usual = word(problems, table.on_startup_difference.as_ref(), OnDifference::default());
+    let mut entries = Vec::with_capacity(table.startup.len());
+    for entry in &table.startup {
+        let entry = entry.get_ref();
+        let id = number(problems, &entry.parameter, OBJECT, |id| matches!(id, Id::Object(_)));
+        let on_difference = word(problems, entry.on_difference.as_ref(), usual.unwrap_or_default());
+        let data_type = value::optional(&entry.kind, |word| {
+            value::word(problems, word, "type of an object", Cia402Type::NAMED)
+        });
+        let fits = data_type.flatten().is_none_or(|kind| fits(problems, &entry.value, kind));
+        let made = data_type.and_then(|data_type| made(id, &entry.value, data_type, on_difference));
+        entries.push(made.filter(|_| fits));
+    }
+    once(problems, table.startup.iter().map(|entry| &entry.get_ref().parameter), &entries);
+    usual.and(entries.into_iter().collect())
+}
+
+fn made(
+    id: Option<Id>,
+    value: &Spanned<Scalar>,
+    data_type: Option<Cia402Type>,
+    on_difference: Option<OnDifference>,
+) -> Option<StartupEntry> {
+    let value = StartupValue::Text(value.get_ref().0.clone());
+    Some(StartupEntry { id: id?, value, data_type, on_difference: on_difference?, from_file: false })
+}
+
+fn file(problems: &mut Problems, path: Option<&Spanned<String>>) {
+    if let Some(path) = path {
+        value::path(problems, path, "the start-up list of a drive");
+    }
+}
+
+fn word(
+    problems: &mut Problems,
+    word: Option<&Spanned<String>>,
+    usual: OnDifference,
+) -> Option<OnDifference> {
+    value::word_or(problems, word, "reaction to a difference", &OnDifference::NAMED, usual)
+}
+
+/// A parameter by its number.
+fn number(
+    problems: &mut Problems,
+    text: &Spanned<String>,
+    expected: &str,
+    is_of_bus: impl Fn(Id) -> bool,
+) -> Option<Id> {
+    match Id::parse(text.get_ref()) {
+        Some(id) if is_of_bus(id) => Some(id),
+        Some(id) => problems.report(
+            text.span(),
+            format_args!("`{}` is a number of {} drives", text.get_ref(), id.bus()),
+            format_args!("expected {expected}"),
+        ),
+        None => problems.report(
+            text.span(),
+            format_args!("`{}` is not the number of a parameter", text.get_ref()),
+            format_args!("expected {expected}"),
+        ),
+    }
+}
+
+/// Whether a value is one of the type.
+fn fits(problems: &mut Problems, value: &Spanned<Scalar>, kind: Cia402Type) -> bool {
+    match Kind::Object(kind).encode(&value.get_ref().0) {
+        Ok(_) => true,
+        Err(error) => {
+            let title = format!("the value is not a {}", kind.name());
+            problems.push(Problem::new(code::STARTUP, value.span()).title(title).expected(error.to_string()));
+            false
+        }
+    }
+}
+
+/// Each parameter is in a list once, however it is written.
+fn once<'t>(
+    problems: &mut Problems,
+    numbers: impl Iterator<Item = &'t Spanned<String>>,
+    entries: &[Option<StartupEntry>],
+) {
+    let numbers: Vec<_> = numbers.collect();
+    for (at, entry) in entries.iter().enumerate() {
+        let Some(entry) = entry else { continue };
+        let same =
+            |earlier: &Option<StartupEntry>| earlier.as_ref().is_some_and(|earlier| earlier.id == entry.id);
+        if let Some(first) = entries[..at].iter().position(same) {
+            problems.duplicate(
+                &format!("the parameter {}", entry.id),
+                numbers[first].span(),
+                numbers[at].span(),
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::checked;
+    use super::*;
+
+    fn told<T: std::fmt::Debug>(checked: Result<T, Vec<String>>) -> Vec<String> {
+        checked.map(|_| Vec::new()).unwrap_or_else(|titles| titles)
+    }
+
+    fn of_sercos(keys: &str) -> Result<Vec<StartupEntry>, Vec<String>> {
+        checked(&format!("name = \"a\"\naddress = 1\n{keys}"), sercos)
+    }
+
+    fn of_can(keys: &str) -> Result<Vec<StartupEntry>, Vec<String>> {
+        checked(&format!("name = \"a\"\nnode = 1\n{keys}"), can)
+    }
+
+    #[test]
+    fn values_are_numbers_and_texts_and_the_drive_has_a_usual_reaction() {
+        let list = of_sercos(
+            "on_startup_difference = \"refuse\"\n[[startup]]\nparameter = \"S-0-0121\"\nvalue = 3\n\
+             [[startup]]\nparameter = \"p-0-123\"\nvalue = 0.10\non_difference = \"warn\"\n\
+             [[startup]]\nparameter = \"S-0-0076\"\nvalue = \"0b0101\"\non_difference = \"write\"\n",
+        )
+        .expect("a list");
+        let shown: Vec<_> = list
+            .iter()
+            .map(|entry| format!("{} {:?} {:?}", entry.id, entry.value, entry.on_difference))
+            .collect();
+        assert_eq!(
+            shown,
+            ["S-0-0121 Text(\"3\") Refuse", "P-0-0123 Text(\"0.1\") Warn", "S-0-0076 Text(\"0b0101\") Write"]
+        );
+        let list =
+            of_can("[[startup]]\nparameter = \"6091:01\"\nvalue = -3\ntype = \"i32\"\n").expect("a list");
+        assert_eq!((list[0].data_type, list[0].on_difference), (Some(Cia402Type::I32), OnDifference::Write));
+        assert_eq!(list[0].bytes(Kind::Object(Cia402Type::I32)), Ok(vec![0xFD, 0xFF, 0xFF, 0xFF]));
+    }
+
+    #[test]
+    fn what_is_no_entry_is_named() {
+        let entry =
+            |parameter: &str, rest: &str| format!("[[startup]]\nparameter = \"{parameter}\"\n{rest}\n");
+        for (parameter, rest, expected) in [
+            ("S-0-4096", "value = 1", "`S-0-4096` is not the number of a parameter"),
+            ("6091:01", "value = 1", "`6091:01` is a number of CANopen drives"),
+            (
+                "S-0-0121",
+                "value = 1\non_difference = \"ignore\"",
+                "unknown reaction to a difference `ignore`",
+            ),
+        ] {
+            assert_eq!(told(of_sercos(&entry(parameter, rest))), [expected]);
+        }
+        for (parameter, rest, expected) in [
+            ("6091", "value = 1", "`6091` is not the number of a parameter"),
+            ("S-0-0121", "value = 1", "`S-0-0121` is a number of SERCOS drives"),
+            ("6091:01", "value = 1\ntype = \"int\"", "unknown type of an object `int`"),
+            ("6091:01", "value = 256\ntype = \"u8\"", "the value is not a u8"),
+            ("6091:01", "value = 1.5\ntype = \"u32\"", "the value is not a u32"),
+        ] {
+            assert_eq!(told(of_can(&entry(parameter, rest))), [expected]);
+        }
+        let twice = format!("{}{}", entry("S-0-0121", "value = 1"), entry("s-0-121", "value = 2"));
+        assert_eq!(told(of_sercos(&twice)), ["the parameter S-0-0121 is used twice"]);
+        assert_eq!(
+            told(of_sercos("startup_file = \"\"")),
+            ["the path of the start-up list of a drive is empty"]
+        );
+    }
+}

@@ -1,0 +1,8 @@
+//! Parameters of drives by the number that they have there: how people write the number and the value, what is known of them without
+//! the drive, the file of a backup, and the start-up list of a drive.
+
+pub mod backup;
+pub mod id;
+pub mod known;
+pub mod startup;
+pub mod value;
