@@ -6,6 +6,7 @@ pub mod can_actor;
 pub mod can_bus;
 pub mod can_drive;
 pub mod can_process;
+pub mod can_twin;
 pub mod clock;
 pub mod controller;
 pub mod controller_time;

@@ -5,6 +5,7 @@
 //! refused when the drive never was enabled and the box named it. The tables are snapshots, texts included.
 
 mod canopen;
+mod data_sheets;
 mod devicenet;
 mod sercos;
 
