@@ -10,7 +10,7 @@ mod dictionary;
 mod doctor;
 mod eds;
 mod gateway_client;
-mod param;
+pub(crate) mod param;
 mod progress;
 mod report;
 mod run;
@@ -481,6 +481,9 @@ struct SercosDriveArguments {
     /// Addresses of the linear drives, separated by commas. The others are rotary.
     #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
     linear: Vec<u16>,
+    /// Behave like the drive of this file, written by `axisbridge param backup`: with its settings, and with no others.
+    #[arg(long, value_name = "BACKUP")]
+    like: Option<PathBuf>,
     /// The drives can be plugged in while the bus runs (SCP_HP).
     #[arg(long)]
     hot_plug: bool,

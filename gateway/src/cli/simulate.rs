@@ -35,6 +35,7 @@ use crate::simulate::drive_events::console::{Director, say, typed_lines};
 use crate::simulate::drive_events::{Names, Script};
 use crate::simulate::drives::{self, DriveLine, LineKind};
 use crate::simulate::program::{self, AxisPlan};
+use crate::simulate::sercos_twin::Twin;
 use crate::simulate::setup;
 use crate::sys::can_interface;
 use crate::sys::can_socket::{self, CanSocket};
@@ -87,7 +88,8 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         _ if arguments.hot_plug => LineKind::HotPlug,
         _ => LineKind::Plain,
     };
-    let mut drives = DriveLine::new(addresses, ring, &line, &script.setup)?;
+    let twin = arguments.like.as_deref().map(Twin::load).transpose()?;
+    let mut drives = DriveLine::like(addresses, ring, &line, &script.setup, twin.as_ref())?;
     let stop = stop_after(arguments.seconds)?;
     let mut sockets = ArrayVec::new();
     for interface in std::iter::once(&arguments.interface).chain(&arguments.ring) {

@@ -16,4 +16,5 @@ pub mod drives;
 pub mod grandmaster;
 pub mod program;
 pub mod script;
+pub mod sercos_twin;
 pub mod setup;

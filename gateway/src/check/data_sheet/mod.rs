@@ -160,7 +160,7 @@ impl Device<'_> {
 
     /// Whether it has the bit rate of the bus.
     fn bit_rate(&mut self) {
-        let rate = self.bus.bit_rate.get();
+        let rate = self.bus.bit_rate.nominal();
         let has = &self.description().device.bit_rates;
         if has.is_empty() || has.iter().any(|known| u32::from(*known) * 1_000 == rate) {
             return;
