@@ -33,7 +33,9 @@ pub enum SheetError {
         reason: String,
     },
     /// It describes no drive.
-    #[error("{0}: expected a data sheet (EDS) or device configuration (DCF) with 6040 and 6041, as drives have them")]
+    #[error(
+        "{0}: expected a data sheet (EDS) or device configuration (DCF) with 6040 and 6041, as drives have them"
+    )]
     NoDrive(String),
 }
 

@@ -7,9 +7,11 @@ use profile_sercos::slave::parameter::Store;
 use profile_sercos::wire::attribute::Attribute;
 use profile_sercos::wire::idn::Idn;
 
-use crate::cli::CliError;
 use crate::cli::param::file::{Backup, Kept};
 use crate::local::drive::value::{Kind, unhex};
+
+/// Why there is no drive like that of a file.
+type TwinError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Settings of a drive: fewer than a slave can have parameters.
 const PARAMETERS_MAX: usize = 3_500;
@@ -41,7 +43,7 @@ impl Twin {
     ///
     /// # Errors
     /// It cannot be read, is no backup, or not one of a SERCOS drive.
-    pub fn load(path: &Path) -> Result<Self, CliError> {
+    pub fn load(path: &Path) -> Result<Self, TwinError> {
         let backup = Backup::load(path)?;
         Self::of(&backup).map_err(|error| format!("{}: {error}", path.display()).into())
     }
@@ -50,7 +52,7 @@ impl Twin {
     ///
     /// # Errors
     /// As [`Twin::load`].
-    pub fn parse(text: &str) -> Result<Self, CliError> {
+    pub fn parse(text: &str) -> Result<Self, TwinError> {
         Ok(Self::of(&Backup::parse(text)?)?)
     }
 
@@ -97,7 +99,8 @@ fn given(kept: &Kept) -> Result<Given, String> {
         "" => None,
         text => {
             let word = text.strip_prefix("0x").and_then(|digits| u32::from_str_radix(digits, 16).ok());
-            let word = word.ok_or_else(|| format!("{idn}: expected an attribute such as 0x01110001, got `{text}`"))?;
+            let word =
+                word.ok_or_else(|| format!("{idn}: expected an attribute such as 0x01110001, got `{text}`"))?;
             Some(Attribute(word))
         }
     };
@@ -151,9 +154,15 @@ mod tests {
         let store = line.network_mut().slaves()[0].store();
         let get = |idn: Idn| store.get(store.find(idn).unwrap_or_else(|| panic!("no {idn}")));
         let gain = get(Idn::POSITION_LOOP_KV);
-        assert_eq!((gain.number(), gain.minimum(), gain.maximum(), gain.unit()), (250, Some(10), Some(3_000), "1000/min"));
+        assert_eq!(
+            (gain.number(), gain.minimum(), gain.maximum(), gain.unit()),
+            (250, Some(10), Some(3_000), "1000/min")
+        );
         let brake = get("P-0-4011".parse().expect("an IDN"));
-        assert_eq!((brake.number(), brake.minimum(), brake.maximum(), brake.name()), (-7, Some(-10), Some(10), "Brake delay"));
+        assert_eq!(
+            (brake.number(), brake.minimum(), brake.maximum(), brake.name()),
+            (-7, Some(-10), Some(10), "Brake delay")
+        );
         assert_eq!(get("P-0-0003".parse().expect("an IDN")).data(), [1, 2, 3]);
         assert_eq!(get(Idn::structured(1300, 0, 5)).data(), b"HX-9");
         assert_eq!(get(VENDOR_CODE).number(), 0x539);

@@ -130,7 +130,11 @@ mod tests {
     fn reading_gives_the_value_of_the_node_or_why_not() {
         let description = description();
         let read = |index, sub| description.reads(Mux::new(index, sub), NODE);
-        assert_eq!(read(0x1014, 0), Ok(Some(vec![0x95, 0, 0, 0])), "the configured one counts before the default");
+        assert_eq!(
+            read(0x1014, 0),
+            Ok(Some(vec![0x95, 0, 0, 0])),
+            "the configured one counts before the default"
+        );
         assert_eq!(read(0x6041, 0), Ok(Some(vec![0x40, 0])));
         assert_eq!(read(0x2002, 0), Ok(Some(b"abc".to_vec())));
         assert_eq!(read(0x1018, 1), Ok(None), "the file does not say it");
@@ -164,9 +168,16 @@ mod tests {
         assert_eq!(map(receive, 0x6041_0010), Err(AbortCode::NOT_MAPPABLE));
         assert_eq!(map(transmit, 0x6041_0010), Ok(()));
         assert_eq!(map(transmit, 0x2000_0010), Err(AbortCode::NOT_MAPPABLE), "it is only received");
-        assert_eq!(map(receive, 0x2001_0020), Err(AbortCode::NOT_MAPPABLE), "the file does not say that it can be");
+        assert_eq!(
+            map(receive, 0x2001_0020),
+            Err(AbortCode::NOT_MAPPABLE),
+            "the file does not say that it can be"
+        );
         assert_eq!(map(receive, 0x607A_0020), Err(AbortCode::NO_OBJECT));
-        assert_eq!([map(receive, 0x0005_0008), map(receive, 0x0006_0010)], [Ok(()), Err(AbortCode::NOT_MAPPABLE)]);
+        assert_eq!(
+            [map(receive, 0x0005_0008), map(receive, 0x0006_0010)],
+            [Ok(()), Err(AbortCode::NOT_MAPPABLE)]
+        );
     }
 
     #[test]

@@ -73,7 +73,9 @@ fn objects(text: &mut String, dictionary: &Dictionary) -> std::fmt::Result {
 }
 
 fn one_object(text: &mut String, dictionary: &Dictionary, object: &Object) -> std::fmt::Result {
-    let parts = || dictionary.entries().iter().filter(|entry| entry.mux().index == object.index && !entry.is_hidden());
+    let parts = || {
+        dictionary.entries().iter().filter(|entry| entry.mux().index == object.index && !entry.is_hidden())
+    };
     writeln!(text, "[{:04X}]\nParameterName={}", object.index, object.name)?;
     let is_domain = parts().any(|entry| entry.definition().data_type == DataType::Domain);
     let code = match object.shape {
@@ -121,9 +123,7 @@ fn one_entry(text: &mut String, entry: &Entry) -> std::fmt::Result {
         DataType::Domain | DataType::Octets | DataType::F32 | DataType::F64 => {}
         data_type => {
             let (lowest, highest) = data_type.range();
-            if (definition.low, definition.high) != (lowest, highest)
-                && definition.access.writes()
-            {
+            if (definition.low, definition.high) != (lowest, highest) && definition.access.writes() {
                 writeln!(text, "LowLimit={}\nHighLimit={}", definition.low, definition.high)?;
             }
             match (definition.adds_node, data_type) {

@@ -87,7 +87,10 @@ fn rows() -> Vec<Row> {
     let velocity = ControlMode::VELOCITY;
     vec![
         row("servo drive with everything", "nordwind-sd5.eds", ""),
-        Row { mode: velocity, ..row("the same in velocity control", "nordwind-sd5.eds", "modes = [\"velocity\"]") },
+        Row {
+            mode: velocity,
+            ..row("the same in velocity control", "nordwind-sd5.eds", "modes = [\"velocity\"]")
+        },
         Row {
             keys: ["", "", "identity = { vendor_id = 0x7F00_0001, product_code = 0x5D06 }"],
             ..row("the same, and another product is expected", "nordwind-sd5.eds", "")
@@ -103,7 +106,10 @@ fn rows() -> Vec<Row> {
         row("csp only, and torque is asked for", "halden-x1.eds", "modes = [\"position\", \"torque\"]"),
         row("6502 is not there", "brook-m20.eds", ""),
         row("homing only", "pilgrim-h.eds", "modes = [\"position\", \"homing\"]"),
-        Row { turns: 5.0, ..row("device configuration with formulas", "estrella-k7.dcf", "modes = [\"position\"]") },
+        Row {
+            turns: 5.0,
+            ..row("device configuration with formulas", "estrella-k7.dcf", "modes = [\"position\"]")
+        },
         row("written by hand", "motmot-7.eds", ""),
         row("first axis of two", "gemella-902.eds", ""),
         row("second axis of two", "gemella-902.eds", "axis = 1"),
@@ -232,8 +238,15 @@ fn what_check_says_of_a_data_sheet_is_what_becomes_of_a_drive_like_it() {
         }
         let (has_error, found) = checked(&row, number);
         // A simulated bus has every bit rate, and only its drives do not.
-        let (works, log) = if row.name.starts_with("a bit rate") { (false, Vec::new()) } else { driven(&row) };
-        let _ = writeln!(text, "{} ({}): {}\n  check:\n{found}  box:", row.name, row.file, if works { "works" } else { "refused" });
+        let (works, log) =
+            if row.name.starts_with("a bit rate") { (false, Vec::new()) } else { driven(&row) };
+        let _ = writeln!(
+            text,
+            "{} ({}): {}\n  check:\n{found}  box:",
+            row.name,
+            row.file,
+            if works { "works" } else { "refused" }
+        );
         for line in log {
             let _ = writeln!(text, "    {line}");
         }
@@ -252,12 +265,17 @@ fn a_drive_like_that_of_a_data_sheet_has_its_objects_and_no_others() {
         let name = path.file_name().and_then(|name| name.to_str()).expect("a plain name").to_owned();
         let description = read(&std::fs::read(&path).expect("readable")).expect("a data sheet").description;
         let sheet = Sheet::load(&path).expect("a data sheet of a drive");
-        let mut drive = ask::Asked::new(sheet.drive(NodeId::new(NODE).ok(), 77, &Setup::default()).expect("a drive"));
+        let mut drive =
+            ask::Asked::new(sheet.drive(NodeId::new(NODE).ok(), 77, &Setup::default()).expect("a drive"));
         let mut compared = 0;
         for index in 0x1000..=0x9FFF_u16 {
             let Some(object) = description.object(index) else {
                 if index % 16 == 0 || (0x6000..0x6900).contains(&index) || (0x1000..0x1030).contains(&index) {
-                    assert_eq!(drive.read(index, 0), Err(SdoFailure::Refused(AbortCode::NO_OBJECT)), "{name} {index:04X}");
+                    assert_eq!(
+                        drive.read(index, 0),
+                        Err(SdoFailure::Refused(AbortCode::NO_OBJECT)),
+                        "{name} {index:04X}"
+                    );
                 }
                 continue;
             };
@@ -274,7 +292,8 @@ fn a_drive_like_that_of_a_data_sheet_has_its_objects_and_no_others() {
                     assert_eq!(answer.len(), usize::from(bits).div_ceil(8), "{place}");
                 }
                 // What moves changes, and 0 is not taken where an axis could not move with it.
-                let lives = [0x6041, 0x6061, 0x6064, 0x606C, 0x6077, 0x603F, 0x6044, 0x6043, 0x60F4, 0x60FD, 0x1001];
+                let lives =
+                    [0x6041, 0x6061, 0x6064, 0x606C, 0x6077, 0x603F, 0x6044, 0x6043, 0x60F4, 0x60FD, 0x1001];
                 if let Some(said) = said.filter(|said| said.iter().any(|byte| *byte != 0))
                     && !lives.contains(&index)
                 {

@@ -38,7 +38,8 @@ impl Sheet {
             Ok(bytes) => bytes,
             Err((code, expected)) => {
                 let problem = problem(code).expected(expected);
-                findings.push(&written.text, problem.help("the path starts at the folder of the configuration"));
+                findings
+                    .push(&written.text, problem.help("the path starts at the folder of the configuration"));
                 return None;
             }
         };
@@ -65,9 +66,13 @@ impl Sheet {
             }
         }
         let made_for = reading.description.commissioning.as_ref().and_then(|head| head.node_id);
-        if let Some(node) = made_for.and_then(|node| NodeId::new(node).ok()).filter(|node| *node != device.node) {
-            let problem = problem(code::DEVICE_FILE_ODD).title(format!("the file was made for node-id {node}"));
-            let expected = format!("expected {}: values with $NODEID are right, others may not be", device.node);
+        if let Some(node) =
+            made_for.and_then(|node| NodeId::new(node).ok()).filter(|node| *node != device.node)
+        {
+            let problem =
+                problem(code::DEVICE_FILE_ODD).title(format!("the file was made for node-id {node}"));
+            let expected =
+                format!("expected {}: values with $NODEID are right, others may not be", device.node);
             findings.push(&written.text, problem.expected(expected));
         }
         Some(Self { path, text, description: reading.description, source })

@@ -101,11 +101,13 @@ impl Device<'_> {
     fn axis_span(&self, axis: u8, about_modes: bool) -> Range<usize> {
         let config = &self.written.config;
         let axis = config.axes.get(usize::from(axis));
-        let Some((bus, drive)) = axis.and_then(|axis| config.can_drive(axis)) else { return self.span.clone() };
+        let Some((bus, drive)) = axis.and_then(|axis| config.can_drive(axis)) else {
+            return self.span.clone();
+        };
         let tables = config.can.iter().zip(&self.written.file.south.get_ref().can);
-        let mut tables = tables.filter(|(known, _)| core::ptr::eq(*known, bus)).flat_map(|(known, table)| {
-            known.drives.iter().zip(&table.get_ref().drive)
-        });
+        let mut tables = tables
+            .filter(|(known, _)| core::ptr::eq(*known, bus))
+            .flat_map(|(known, table)| known.drives.iter().zip(&table.get_ref().drive));
         let Some((_, table)) = tables.find(|(known, _)| core::ptr::eq(*known, drive)) else {
             return self.span.clone();
         };
@@ -129,7 +131,8 @@ impl Device<'_> {
             let Some(expected) = expected else { continue };
             let object = Mux::new(0x1018, sub);
             if let Err(code) = self.description().look_up(object) {
-                let problem = self.problem(code::SHEET_LACKS, format!("the device has no {what}: {object}: {code}"));
+                let problem =
+                    self.problem(code::SHEET_LACKS, format!("the device has no {what}: {object}: {code}"));
                 let why = format!("expected {expected:#x}, which `identity` has the gateway compare");
                 self.report(problem.expected(why).help(format!("remove the {what} from `identity`")), None);
                 continue;
@@ -137,8 +140,10 @@ impl Device<'_> {
             let said = self.description().number(object.index, sub, node).filter(|_| sub < 4);
             let found = said.filter(|number| *number != 0).or(of_head.filter(|number| *number != 0));
             if let Some(found) = found.filter(|found| *found != expected) {
-                let problem =
-                    self.problem(code::DATA_SHEET, format!("the data sheet is of a device with the {what} {found:#x}"));
+                let problem = self.problem(
+                    code::DATA_SHEET,
+                    format!("the data sheet is of a device with the {what} {found:#x}"),
+                );
                 let problem = problem.expected(format!("expected {expected:#x}, as `identity` says"));
                 self.report(problem, said.map(|_| object));
             }
@@ -153,7 +158,8 @@ impl Device<'_> {
             let expected = format!("expected the profile {profile} ({profile:#x}) in the low half of 1000");
             self.report(problem.expected(expected).help(help), Some(object));
         } else if let Err(code) = self.description().look_up(object) {
-            let problem = self.problem(code::SHEET_LACKS, format!("the device has no type: {object}: {code}"));
+            let problem =
+                self.problem(code::SHEET_LACKS, format!("the device has no type: {object}: {code}"));
             self.report(problem.expected(format!("expected the profile {profile}")).help(help), None);
         }
     }
@@ -168,7 +174,8 @@ impl Device<'_> {
         let all: Vec<_> = has.iter().map(ToString::to_string).collect();
         let title = format!("the device does not have the bit rate of the bus, {} kbit/s", rate / 1_000);
         let problem = self.problem(code::SHEET_LACKS, title);
-        let problem = problem.expected(format!("expected one of {} kbit/s, by the data sheet", all.join(", ")));
+        let problem =
+            problem.expected(format!("expected one of {} kbit/s, by the data sheet", all.join(", ")));
         self.report(problem.help("set `bit_rate` of the bus to one that all its devices have"), None);
     }
 
@@ -189,13 +196,21 @@ impl Device<'_> {
             && let Err(code) = self.description().takes(Mux::PRODUCER_HEARTBEAT, &bytes, node)
         {
             let object = Mux::PRODUCER_HEARTBEAT;
-            let problem = self.problem(code::SHEET_LACKS, format!("the device has no heartbeat: {object}: {code}"));
-            let problem = problem.expected("expected one, by which the gateway sees that the device is there");
-            self.report(problem.help("write `guarding = \"100 ms\"` for this device, if it has node guarding"), Some(object));
+            let problem =
+                self.problem(code::SHEET_LACKS, format!("the device has no heartbeat: {object}: {code}"));
+            let problem =
+                problem.expected("expected one, by which the gateway sees that the device is there");
+            self.report(
+                problem.help("write `guarding = \"100 ms\"` for this device, if it has node guarding"),
+                Some(object),
+            );
         }
         let factor = |factor: u8| vec![factor];
         let guarding = config.guarding.map(|guard| {
-            [(Mux::GUARD_TIME, number(guard.guard_time_ms)), (Mux::LIFE_TIME_FACTOR, factor(guard.life_time_factor))]
+            [
+                (Mux::GUARD_TIME, number(guard.guard_time_ms)),
+                (Mux::LIFE_TIME_FACTOR, factor(guard.life_time_factor)),
+            ]
         });
         for (object, bytes) in guarding.into_iter().flatten() {
             match self.description().takes(object, &bytes, node) {
@@ -216,8 +231,7 @@ impl Device<'_> {
 
     /// Commissioning and PDOs.
     fn commissioning(&mut self, master: &MasterConfig, axes: Vec<AxisSetup>) {
-        let numbers: Vec<u8> =
-            axes.iter().map(|setup| u8::try_from(setup.axis).unwrap_or(u8::MAX)).collect();
+        let numbers: Vec<u8> = axes.iter().map(|setup| u8::try_from(setup.axis).unwrap_or(u8::MAX)).collect();
         let sheet = self.sheet;
         let (mapping, node, description) = (self.mapping, self.device.node, &sheet.description);
         let run = |keeps| rehearse(mapping, master, node, axes.clone(), description, keeps);
@@ -280,8 +294,11 @@ impl Device<'_> {
         let object = Mux::new(profile_cia402::drive::index::COB_ID_SYNC, 0);
         let Err(code) = self.description().look_up(object) else { return };
         if made(rehearsal).is_some() {
-            let problem = self.problem(code::SHEET_SILENT, format!("the data sheet has no SYNC: {object}: {code}"));
-            let problem = problem.expected("expected it with the identifier 0x80, by which set-points and actual values are taken");
+            let problem =
+                self.problem(code::SHEET_SILENT, format!("the data sheet has no SYNC: {object}: {code}"));
+            let problem = problem.expected(
+                "expected it with the identifier 0x80, by which set-points and actual values are taken",
+            );
             self.report(problem.help("ask its maker whether the device follows SYNC"), None);
         }
     }
@@ -300,7 +317,9 @@ impl Device<'_> {
                 };
                 (*axis, code::SHEET_LACKS, error.to_string(), object, about_modes)
             }
-            Notice::NodeProgram { axis, error, .. } => (*axis, code::SHEET_PDOS, error.to_string(), None, true),
+            Notice::NodeProgram { axis, error, .. } => {
+                (*axis, code::SHEET_PDOS, error.to_string(), None, true)
+            }
             Notice::NodeCommissioning { axis, failure, .. } => {
                 (*axis, code::SHEET_LACKS, failure.to_string(), Some(mux(failure.object)), false)
             }
@@ -326,7 +345,8 @@ impl Device<'_> {
                 for (mode, why) in modes {
                     let problem = Problem::new(code::SHEET_WITHOUT, self.axis_span(axis, true));
                     let problem = problem.title(format!("the axis works without the mode {mode}"));
-                    let object = matches!(why, Cia402Error::NotSupported { .. }).then_some(Mux::new(0x6502, 0));
+                    let object =
+                        matches!(why, Cia402Error::NotSupported { .. }).then_some(Mux::new(0x6502, 0));
                     let help = "write `modes` for this drive with those that the axis is used for";
                     self.report(problem.expected(why.to_string()).help(help), object);
                 }
@@ -335,12 +355,16 @@ impl Device<'_> {
                 let names = listed(objects.iter().map(ToString::to_string).collect());
                 let problem = Problem::new(code::SHEET_WITHOUT, self.axis_span(axis, false));
                 let title = format!("the axis works without {names}: no PDO that can be used carries it");
-                let problem = problem.title(title).help("map it with the maker's tool, or leave it out of `actual_values`");
+                let problem = problem
+                    .title(title)
+                    .help("map it with the maker's tool, or leave it out of `actual_values`");
                 self.report(problem, objects.first().map(|object| mux(*object)));
             }
             Notice::Period { axis, expected, found, .. } => {
                 let problem = Problem::new(code::SHEET_WITHOUT, self.axis_span(axis, false));
-                let title = format!("the drive expects set-points every {found} (60C2), and they come every {expected}");
+                let title = format!(
+                    "the drive expects set-points every {found} (60C2), and they come every {expected}"
+                );
                 let problem = problem.title(title);
                 let help = "set its interpolation time with the maker's tool, or `cycle_time` of the bus";
                 self.report(problem.help(help), Some(Mux::new(0x60C2, 1)));
@@ -393,12 +417,14 @@ impl Device<'_> {
             } else {
                 continue;
             };
-            let problem = Problem::new(code::SHEET_WITHOUT, self.axis_span(axis, false)).title(wrong).help(help);
+            let problem =
+                Problem::new(code::SHEET_WITHOUT, self.axis_span(axis, false)).title(wrong).help(help);
             self.report(problem, Some(mux(object)));
         }
         if !missing.is_empty() {
             let problem = Problem::new(code::SHEET_NOTE, self.axis_span(axis, false));
-            let title = format!("the drive has no object for {} of the parameters of the tables", missing.len());
+            let title =
+                format!("the drive has no object for {} of the parameters of the tables", missing.len());
             let problem = problem.title(title).expected(missing.join(", "));
             self.report(problem, None);
         }

@@ -62,7 +62,10 @@ impl Walk<'_> {
             if let Err(code) = self.takes(object, &wanted.0.to_le_bytes())
                 && !same
             {
-                let text = format!("{} is switched off or has another identifier, and {object}: {code}", self.name());
+                let text = format!(
+                    "{} is switched off or has another identifier, and {object}: {code}",
+                    self.name()
+                );
                 self.all.push(Trouble::Fatal(Refusal { object, text }));
             }
         } else {
@@ -94,7 +97,11 @@ impl Walk<'_> {
             if let Err(code) = taken {
                 self.refuse(object, &format!("it has no entry {sub} for {}", entry.mux()), code);
             } else if let Err(code) = self.description.maps(self.direction, mapped) {
-                self.refuse(entry.mux(), &format!("it cannot carry {} of {} bits", entry.mux(), entry.bits()), code);
+                self.refuse(
+                    entry.mux(),
+                    &format!("it cannot carry {} of {} bits", entry.mux(), entry.bits()),
+                    code,
+                );
             }
         }
         let entries = u8::try_from(self.pdo.mapping.len()).unwrap_or(u8::MAX);

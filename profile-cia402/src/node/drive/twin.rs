@@ -76,7 +76,11 @@ pub(super) fn modes(sheet: &DeviceDescription, axis: u16, node: u8) -> Supported
 /// Makes the objects of a simulated drive with so many axes those of a data sheet.
 pub(super) fn shape(dictionary: &mut Dictionary, sheet: &DeviceDescription, axes: usize) {
     // Objects of other manufacturers mean something else, and PDOs carry what the file says.
-    let pdos = |index| Direction::BOTH.iter().any(|way| way.communication().contains(&index) || way.mapping().contains(&index));
+    let pdos = |index| {
+        Direction::BOTH
+            .iter()
+            .any(|way| way.communication().contains(&index) || way.mapping().contains(&index))
+    };
     dictionary.remove(|index| (0x2000..0x6000).contains(&index) || pdos(index));
     dictionary.hide_all();
     for object in &sheet.objects {
@@ -104,16 +108,23 @@ pub(super) fn shape(dictionary: &mut Dictionary, sheet: &DeviceDescription, axes
 
 /// Makes a value of the file one of the dictionary.
 fn value(dictionary: &mut Dictionary, sheet: &DeviceDescription, index: u16, sub: &SubObject) {
-    let Some(data_type) = DataType::ALL.into_iter().find(|known| known.code() == sub.data_type.0) else { return };
+    let Some(data_type) = DataType::ALL.into_iter().find(|known| known.code() == sub.data_type.0) else {
+        return;
+    };
     let mux = Mux::new(index, sub.sub);
     let own = dictionary.find(mux);
     let before = own.map(|handle| *dictionary.entry(handle).definition());
-    let said = sub.setting().and_then(|setting| Some((setting.value.to_bytes(sub.data_type)?, setting.plus_node)));
+    let said =
+        sub.setting().and_then(|setting| Some((setting.value.to_bytes(sub.data_type)?, setting.plus_node)));
     if data_type.is_bytes() {
         let content = said.map(|(bytes, _)| bytes).unwrap_or_default();
         let room = if data_type == DataType::Text { TEXT_LEN } else { DOMAIN_LEN };
         let capacity = if sub.access.writes() { room.max(content.len()) } else { content.len() };
-        let definition = Definition { bytes: (&[], capacity), is_volatile: true, ..definition(sheet, index, sub, data_type, None) };
+        let definition = Definition {
+            bytes: (&[], capacity),
+            is_volatile: true,
+            ..definition(sheet, index, sub, data_type, None)
+        };
         match own {
             Some(handle) => dictionary.redefine(handle, definition),
             None => dictionary.add(mux, definition),
@@ -123,7 +134,8 @@ fn value(dictionary: &mut Dictionary, sheet: &DeviceDescription, index: u16, sub
     }
     let number = said.and_then(|(bytes, plus_node)| Some((data_type.number(&bytes)?, plus_node)));
     // One with which the simulated drive would not move.
-    let is_idle = |number: i64| number == 0 && before.is_some_and(|before| before.low > 0 || is_needed(index, sub.sub));
+    let is_idle =
+        |number: i64| number == 0 && before.is_some_and(|before| before.low > 0 || is_needed(index, sub.sub));
     let (default, adds_node) = match (number.filter(|(number, _)| !is_idle(*number)), before) {
         (Some(said), _) => said,
         (None, Some(before)) => (before.default, before.adds_node),
@@ -167,7 +179,9 @@ fn definition(
         _ if is_fixed => Access::ReadOnly,
         eds::Access::ReadOnly => Access::ReadOnly,
         eds::Access::WriteOnly => Access::WriteOnly,
-        eds::Access::ReadWrite | eds::Access::ReadWriteTransmit | eds::Access::ReadWriteReceive => Access::ReadWrite,
+        eds::Access::ReadWrite | eds::Access::ReadWriteTransmit | eds::Access::ReadWriteReceive => {
+            Access::ReadWrite
+        }
     };
     let mapping = match (sub.pdo_mapping, sub.access.receives(), sub.access.transmits()) {
         (true, true, true) => Mapping::Both,

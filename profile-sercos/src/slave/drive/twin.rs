@@ -115,20 +115,30 @@ mod tests {
         let vendor = Idn::product(4000);
         let slave = drive(vec![
             given(Idn::POSITION_LOOP_KV, &900_u16.to_le_bytes()),
-            Given { name: "Notch frequency".into(), limits: Some((10, 4_000)), ..given(vendor, &250_u16.to_le_bytes()) },
+            Given {
+                name: "Notch frequency".into(),
+                limits: Some((10, 4_000)),
+                ..given(vendor, &250_u16.to_le_bytes())
+            },
         ]);
         let store = slave.store();
         assert_eq!(store.number_of(Idn::POSITION_LOOP_KV), 900);
         let notch = store.get(store.find(vendor).expect("it was given"));
-        assert_eq!((notch.name(), notch.number(), notch.minimum(), notch.maximum()), ("Notch frequency", 250, Some(10), Some(4_000)));
+        assert_eq!(
+            (notch.name(), notch.number(), notch.minimum(), notch.maximum()),
+            ("Notch frequency", 250, Some(10), Some(4_000))
+        );
         // Not given, so it has none; nor does it say so in its lists.
         assert!(store.find(Idn::MONITORING_WINDOW).is_none());
-        let list = store.get(store.find(Idn::IDN_LIST_OF_ALL_BACKUP_OPERATION_DATA).expect("every slave has it"));
+        let list =
+            store.get(store.find(Idn::IDN_LIST_OF_ALL_BACKUP_OPERATION_DATA).expect("every slave has it"));
         let idns: Vec<u32> =
             list.data().chunks(4).map(|idn| u32::from_le_bytes([idn[0], idn[1], idn[2], idn[3]])).collect();
         assert_eq!(idns, [Idn::POSITION_LOOP_KV.0, vendor.0]);
         // What the protocol needs it has.
-        for idn in [Idn::DRIVE_CONTROL, Idn::DRIVE_STATUS, Idn::POSITION_COMMAND, Idn::POSITION_FEEDBACK_VALUE_1] {
+        for idn in
+            [Idn::DRIVE_CONTROL, Idn::DRIVE_STATUS, Idn::POSITION_COMMAND, Idn::POSITION_FEEDBACK_VALUE_1]
+        {
             assert!(store.find(idn).is_some(), "{idn}");
         }
     }
