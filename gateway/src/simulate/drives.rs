@@ -215,6 +215,12 @@ impl DriveLine {
         &mut self.network
     }
 
+    /// The same, without the line.
+    #[must_use]
+    pub fn into_network(self) -> DriveNetwork {
+        self.network
+    }
+
     fn index(&self, drive: u16) -> Option<usize> {
         let index = usize::from(drive.checked_sub(self.first)?);
         (index < self.network.slaves().len()).then_some(index)

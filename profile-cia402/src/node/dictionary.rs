@@ -368,7 +368,7 @@ impl Entry {
 
     fn default(&self, node: Option<NodeId>) -> i64 {
         let node = node.filter(|_| self.definition.adds_node);
-        self.definition.default + node.map_or(0, |node| i64::from(node.get()))
+        self.definition.default.saturating_add(node.map_or(0, |node| i64::from(node.get())))
     }
 }
 

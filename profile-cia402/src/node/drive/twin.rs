@@ -142,10 +142,21 @@ fn value(dictionary: &mut Dictionary, sheet: &DeviceDescription, index: u16, sub
         (None, None) => unsaid(index, sub.sub),
     };
     let made = definition(sheet, index, sub, data_type, before);
-    let (lowest, highest) = data_type.range();
+    // The device computes with what it has itself, in whatever type a file gives it: in 32 bits at most.
+    let (lowest, highest) = match data_type.range() {
+        (lowest, highest) if before.is_some() || index < 0x2000 => {
+            (lowest.max(i64::from(i32::MIN)), highest.min(i64::from(u32::MAX)))
+        }
+        range => range,
+    };
     let default = default.clamp(lowest, highest);
-    let definition =
-        Definition { default, adds_node, low: made.low.min(default), high: made.high.max(default), ..made };
+    let definition = Definition {
+        default,
+        adds_node,
+        low: made.low.clamp(lowest, default),
+        high: made.high.clamp(default, highest),
+        ..made
+    };
     match own {
         Some(handle) => dictionary.redefine(handle, definition),
         None => dictionary.add(mux, definition),
@@ -272,7 +283,7 @@ fn scale(dictionary: &mut Dictionary, sheet: &DeviceDescription, axis: u16) {
         let is_said = sheet.number(mux.index, sub, 0).is_some_and(|number| number != 0);
         let Some(handle) = dictionary.find(mux).filter(|_| !is_said) else { continue };
         let counts = of(&scales, unit).counts(of(&preset, unit).servo(dictionary.entry(handle).number()));
-        dictionary.set_default(handle, counts.max(1));
+        dictionary.set_default(handle, counts.clamp(1, i64::from(u32::MAX)));
     }
 }
 
