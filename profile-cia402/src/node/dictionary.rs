@@ -487,6 +487,12 @@ impl Dictionary {
         entries.for_each(|entry| entry.definition.access = Access::Constant);
     }
 
+    /// The node-id that is added to identifiers; 0 without.
+    #[must_use]
+    pub fn node_number(&self) -> u8 {
+        self.node.map_or(0, NodeId::get)
+    }
+
     /// Keeps all entries for the device itself: for clients there are none until [`Dictionary::redefine`] or [`Dictionary::add`]
     /// makes them known again.
     pub fn hide_all(&mut self) {

@@ -349,6 +349,9 @@ fn limits_lengths_and_formulas_of_a_data_sheet_are_kept() {
     assert_eq!(configured.read(0x1014, 0), Ok(0x83_u32.to_le_bytes().to_vec()));
     assert_eq!(configured.read(0x1800, 1), Ok(0x4000_0183_u32.to_le_bytes().to_vec()));
     assert_eq!(configured.read(0x2201, 0), Ok(vec![4]));
+    assert_eq!([configured.write(0x2201, 0, &[3]), configured.write(0x2201, 0, &[13])], [Ok(()), Ok(())]);
+    assert_eq!(configured.write(0x2201, 0, &[14]), refused(AbortCode::TOO_HIGH));
+    assert_eq!(configured.write(0x2201, 0, &[2]), refused(AbortCode::TOO_LOW));
     // Types that no object of the simulated drive has.
     let mut big = drive("colossus-b16.eds");
     let text = std::fs::read(sheets().join("colossus-b16.eds")).expect("readable");

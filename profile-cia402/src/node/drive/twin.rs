@@ -111,7 +111,7 @@ fn value(dictionary: &mut Dictionary, sheet: &DeviceDescription, index: u16, sub
     let Some(data_type) = DataType::ALL.into_iter().find(|known| known.code() == sub.data_type.0) else {
         return;
     };
-    let mux = Mux::new(index, sub.sub);
+    let (mux, node) = (Mux::new(index, sub.sub), dictionary.node_number());
     let own = dictionary.find(mux);
     let before = own.map(|handle| *dictionary.entry(handle).definition());
     let said =
@@ -123,7 +123,7 @@ fn value(dictionary: &mut Dictionary, sheet: &DeviceDescription, index: u16, sub
         let definition = Definition {
             bytes: (&[], capacity),
             is_volatile: true,
-            ..definition(sheet, index, sub, data_type, None)
+            ..definition(sheet, (index, node), sub, data_type, None)
         };
         match own {
             Some(handle) => dictionary.redefine(handle, definition),
@@ -141,7 +141,7 @@ fn value(dictionary: &mut Dictionary, sheet: &DeviceDescription, index: u16, sub
         (None, Some(before)) => (before.default, before.adds_node),
         (None, None) => unsaid(index, sub.sub),
     };
-    let made = definition(sheet, index, sub, data_type, before);
+    let made = definition(sheet, (index, node), sub, data_type, before);
     // The device computes with what it has itself, in whatever type a file gives it: in 32 bits at most.
     let (lowest, highest) = match data_type.range() {
         (lowest, highest) if before.is_some() || index < 0x2000 => {
@@ -150,13 +150,10 @@ fn value(dictionary: &mut Dictionary, sheet: &DeviceDescription, index: u16, sub
         range => range,
     };
     let default = default.clamp(lowest, highest);
-    let definition = Definition {
-        default,
-        adds_node,
-        low: made.low.clamp(lowest, default),
-        high: made.high.clamp(default, highest),
-        ..made
-    };
+    // What it has is within its limits, whatever those are.
+    let has = default.saturating_add(if adds_node { node.into() } else { 0 }).min(highest);
+    let (low, high) = (made.low.clamp(lowest, has), made.high.clamp(has, highest));
+    let definition = Definition { default, adds_node, low, high, ..made };
     match own {
         Some(handle) => dictionary.redefine(handle, definition),
         None => dictionary.add(mux, definition),
@@ -166,14 +163,14 @@ fn value(dictionary: &mut Dictionary, sheet: &DeviceDescription, index: u16, sub
 /// The definition of a value of the file, without its default.
 fn definition(
     sheet: &DeviceDescription,
-    index: u16,
+    (index, node): (u16, u8),
     sub: &SubObject,
     data_type: DataType,
     before: Option<Definition>,
 ) -> Definition {
     let (lowest, highest) = data_type.range();
     let limit = |setting: &Option<eds::Setting>| {
-        let number = setting.as_ref().filter(|setting| !setting.plus_node)?.value.as_integer()?;
+        let number = setting.as_ref()?.at(node)?.as_integer()?;
         i64::try_from(number).ok()
     };
     let has_order = !matches!(data_type, DataType::U64 | DataType::F32 | DataType::F64);
