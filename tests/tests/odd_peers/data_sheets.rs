@@ -150,7 +150,7 @@ fn checked(row: &Row, number: usize) -> (bool, String) {
     let mut has_error = false;
     for finding in outcome.tables.findings.list() {
         let is_own = own.contains(&finding.code.to_string().as_str());
-        assert!(is_own || finding.severity() != Severity::Error, "{}: {}", row.name, finding.rendered);
+        assert!(is_own || finding.severity() != Severity::Error, "{}: {}", row.name, finding.title);
         if !is_own {
             continue;
         }
@@ -231,7 +231,7 @@ fn driven(row: &Row) -> (bool, Vec<String>) {
 
 #[test]
 fn what_check_says_of_a_data_sheet_is_what_becomes_of_a_drive_like_it() {
-    let mut text = String::new();
+    let (mut text, mut differ) = (String::new(), Vec::new());
     for (number, row) in rows().into_iter().enumerate() {
         if super::left_out(row.name) {
             continue;
@@ -250,8 +250,15 @@ fn what_check_says_of_a_data_sheet_is_what_becomes_of_a_drive_like_it() {
         for line in log {
             let _ = writeln!(text, "    {line}");
         }
-        assert_eq!(works, !has_error, "{text}");
+        if works == has_error {
+            differ.push(row.name);
+        }
     }
+    assert!(
+        differ.is_empty(),
+        "{differ:?}
+{text}"
+    );
     insta::assert_snapshot!(text);
 }
 
@@ -318,6 +325,7 @@ fn limits_lengths_and_formulas_of_a_data_sheet_are_kept() {
         ask::Asked::new(sheet.drive(NodeId::new(NODE).ok(), 77, &Setup::default()).expect("a drive"))
     };
     let refused = |code| Err(SdoFailure::Refused(code));
+    let unread = |code| Err::<Vec<u8>, _>(SdoFailure::Refused(code));
     let mut servo = drive("nordwind-sd5.eds");
     // 60C2:01 from 1 to 250, 605D from 1 to 2, 6098 from -4 to 37.
     assert_eq!(servo.write(0x60C2, 1, &[250]), Ok(()));
@@ -330,8 +338,8 @@ fn limits_lengths_and_formulas_of_a_data_sheet_are_kept() {
     assert_eq!(servo.write(0x6064, 0, &[0; 4]), refused(AbortCode::READ_ONLY));
     assert_eq!(servo.write(0x6060, 0, &[7]), refused(AbortCode::VALUE), "ip is not in its 6502");
     // What is not in the file is not there, though the simulated drive works with it.
-    assert_eq!(servo.read(0x60C1, 1), refused(AbortCode::NO_OBJECT));
-    assert_eq!(servo.read(0x2FFF, 1), refused(AbortCode::NO_OBJECT));
+    assert_eq!(servo.read(0x60C1, 1), unread(AbortCode::NO_OBJECT));
+    assert_eq!(servo.read(0x2FFF, 1), unread(AbortCode::NO_OBJECT));
     // Its identity, and the serial number that the file does not say.
     assert_eq!(servo.read(0x1018, 2), Ok(0x5D05_u32.to_le_bytes().to_vec()));
     assert_eq!(servo.read(0x1018, 4), Ok(77_u32.to_le_bytes().to_vec()));
@@ -373,7 +381,7 @@ fn limits_lengths_and_formulas_of_a_data_sheet_are_kept() {
     }
     assert_eq!(big.write(0x3000, 40, &[7, 0]), Ok(()));
     assert_eq!(big.read(0x3000, 40), Ok(vec![7, 0]));
-    assert_eq!(big.read(0x3000, 41), refused(AbortCode::NO_SUB_INDEX));
+    assert_eq!(big.read(0x3000, 41), unread(AbortCode::NO_SUB_INDEX));
 }
 
 /// A drive that is asked by SDO, with nobody else on the bus.
