@@ -6,6 +6,7 @@ use axisbridge::simulate::drive_events::setup::Setup;
 use axisbridge::simulate::drives::{DriveLine, DriveNetwork, LineKind};
 use axisbridge::simulate::sercos_twin::Twin;
 use axisbridge_tests::rig::motion::millis;
+use axisbridge_tests::rig::motion_checker::MotionChecker;
 use axisbridge_tests::rig::{Rig, Settings};
 use profile_cip::controller::{Limits, Step};
 use profile_cip::wire::motion::codes::ControlMode;
@@ -75,6 +76,8 @@ fn backup(left_out: &[Idn]) -> String {
             Idn::ROTATIONAL_POSITION_RESOLUTION => {
                 add(idn, parameter.attribute().0, &RESOLUTION.to_le_bytes());
             }
+            // Rotary, by parameters.
+            Idn::POSITION_DATA_SCALING_TYPE => add(idn, parameter.attribute().0, &[0x0A, 0]),
             idn => add(idn, parameter.attribute().0, parameter.data()),
         }
     }
@@ -98,6 +101,7 @@ fn a_drive_like_that_of_a_backup_is_commissioned_with_its_scaling_and_moved() {
         ..Settings::default()
     };
     let mut rig = Rig::new(settings);
+    rig.motion_checker = MotionChecker::default();
     rig.line = line(&backup(&[window]));
     rig.until_ready();
     rig.run_for(millis(200));
