@@ -124,7 +124,7 @@ pub fn page() -> String {
 
 /// Notes that report a fact and ask for nothing.
 pub const FACTS: &[Code] =
-    &[ROW_NUMBERS, REQUIRED_UNSERVED, MODE_UNSERVED, DRIVE_SCALING, DRIVE_MAPPING, FACT_ACCEPTED];
+    &[ROW_NUMBERS, REQUIRED_UNSERVED, MODE_UNSERVED, DRIVE_SCALING, DRIVE_MAPPING, FACT_ACCEPTED, SHEET_NOTE];
 
 macro_rules! registry {
     ($($name:ident = $number:literal $severity:ident $title:literal: $explanation:literal, $example:literal, $remedy:literal;)*) => {

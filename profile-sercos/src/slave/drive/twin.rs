@@ -134,7 +134,8 @@ mod tests {
             store.get(store.find(Idn::IDN_LIST_OF_ALL_BACKUP_OPERATION_DATA).expect("every slave has it"));
         let idns: Vec<u32> =
             list.data().chunks(4).map(|idn| u32::from_le_bytes([idn[0], idn[1], idn[2], idn[3]])).collect();
-        assert_eq!(idns, [Idn::POSITION_LOOP_KV.0, vendor.0]);
+        // S-0-0142, the application type, is one that every slave has.
+        assert_eq!(idns, [Idn::POSITION_LOOP_KV.0, Idn::standard(142).0, vendor.0]);
         // What the protocol needs it has.
         for idn in
             [Idn::DRIVE_CONTROL, Idn::DRIVE_STATUS, Idn::POSITION_COMMAND, Idn::POSITION_FEEDBACK_VALUE_1]
