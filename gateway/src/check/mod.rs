@@ -8,6 +8,7 @@
 mod axes;
 mod bus;
 mod can_bus;
+mod data_sheet;
 mod devicenet_bus;
 mod frames;
 mod marks;
@@ -75,6 +76,7 @@ fn axes(tables: &mapping::check::Outcome, written: &Written, findings: &mut Find
         axes::check(mapping, written, &mut findings);
         bus::check(mapping, written, &mut findings);
         can_bus::check(mapping, written, &mut findings);
+        data_sheet::check(mapping, written, &mut findings);
         devicenet_bus::check(mapping, written, &mut findings);
         modbus::check(mapping, written, &mut findings);
         startup::check(mapping, written, &mut findings);

@@ -10,7 +10,7 @@ mod dictionary;
 mod doctor;
 mod eds;
 mod gateway_client;
-mod param;
+pub(crate) mod param;
 mod progress;
 mod report;
 mod run;
@@ -481,6 +481,9 @@ struct SercosDriveArguments {
     /// Addresses of the linear drives, separated by commas. The others are rotary.
     #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
     linear: Vec<u16>,
+    /// Behave like the drive of this file, written by `axisbridge param backup`: with its settings, and with no others.
+    #[arg(long, value_name = "BACKUP")]
+    like: Option<PathBuf>,
     /// The drives can be plugged in while the bus runs (SCP_HP).
     #[arg(long)]
     hot_plug: bool,
@@ -508,9 +511,13 @@ struct CanDriveArguments {
     /// Serial number, by which LSS distinguishes drives without a node-id [default: the node-id, or the process number]
     #[arg(long, value_name = "N")]
     serial: Option<u32>,
-    /// Number of axes.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
-    axes: u8,
+    /// Number of axes [default: 1, or those of the data sheet]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8), conflicts_with = "like")]
+    axes: Option<u8>,
+    /// Behave like the drive of this data sheet (EDS) or device configuration (DCF): with its objects, types, accesses, limits, values,
+    /// identity and PDOs, and with no others.
+    #[arg(long, value_name = "FILE")]
+    like: Option<PathBuf>,
     /// Number of cycles without a SYNC after which the drive stops.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=1000))]
     sync_losses: u16,

@@ -27,6 +27,7 @@ use crate::mapping::Mapping;
 use crate::simulate::can_actor::Actor;
 use crate::simulate::can_drive;
 use crate::simulate::can_process;
+use crate::simulate::can_twin;
 use crate::simulate::controller::{self, Endpoints};
 use crate::simulate::controller_time::ControllerTime;
 use crate::simulate::devicenet_drive;
@@ -34,6 +35,7 @@ use crate::simulate::drive_events::console::{Director, say, typed_lines};
 use crate::simulate::drive_events::{Names, Script};
 use crate::simulate::drives::{self, DriveLine, LineKind};
 use crate::simulate::program::{self, AxisPlan};
+use crate::simulate::sercos_twin::Twin;
 use crate::simulate::setup;
 use crate::sys::can_interface;
 use crate::sys::can_socket::{self, CanSocket};
@@ -86,7 +88,8 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
         _ if arguments.hot_plug => LineKind::HotPlug,
         _ => LineKind::Plain,
     };
-    let mut drives = DriveLine::new(addresses, ring, &line, &script.setup)?;
+    let twin = arguments.like.as_deref().map(Twin::load).transpose()?;
+    let mut drives = DriveLine::like(addresses, ring, &line, &script.setup, twin.as_ref())?;
     let stop = stop_after(arguments.seconds)?;
     let mut sockets = ArrayVec::new();
     for interface in std::iter::once(&arguments.interface).chain(&arguments.ring) {
@@ -114,13 +117,24 @@ pub fn sercos_drive(arguments: &SercosDriveArguments) -> Result<ExitCode, CliErr
 
 /// A simulated CiA 402 drive on a CAN interface.
 pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
-    let node = arguments.node.map(NodeId::new).transpose()?;
-    let names = Names { what: "axis", numbers: 1..=u16::from(arguments.axes) };
+    let twin = arguments.like.as_deref().map(can_twin::Sheet::load).transpose()?;
+    let of_sheet = twin.as_ref().and_then(can_twin::Sheet::node);
+    let node = arguments.node.map(NodeId::new).transpose()?.or(of_sheet);
+    let axes = twin.as_ref().map_or(arguments.axes.unwrap_or(1), can_twin::Sheet::axes);
+    let names = Names { what: "axis", numbers: 1..=u16::from(axes) };
     let script = events(arguments.script.as_deref(), &names)?;
     // Two that wait for a node-id must not be one to LSS.
     let own = || node.map_or_else(std::process::id, |node| u32::from(node.get()));
     let serial = arguments.serial.unwrap_or_else(own);
-    let mut drive = can_drive::drive_with(node, serial, arguments.axes, &script.setup)?;
+    let mut drive = match twin {
+        None => can_drive::drive_with(node, serial, axes, &script.setup)?,
+        Some(sheet) => {
+            for oddity in sheet.oddities() {
+                eprintln!("{oddity}");
+            }
+            sheet.drive(node, serial, &script.setup)?
+        }
+    };
     drive.set_sync_cycles(arguments.sync_losses);
     if let Some(path) = &arguments.eds {
         std::fs::write(path, drive.eds()).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -135,7 +149,7 @@ pub fn can_drive(arguments: &CanDriveArguments) -> Result<ExitCode, CliError> {
     let mut progress = Progress::new(false);
     progress.step(&format!(
         "a drive with {} on {}, {}{}",
-        if arguments.axes == 1 { "one axis".into() } else { format!("{} axes", arguments.axes) },
+        if axes == 1 { "one axis".into() } else { format!("{axes} axes") },
         arguments.interface,
         node.map_or(format!("with serial number {serial}, waiting for a node-id"), |node| format!(
             "node {node}"

@@ -1,5 +1,7 @@
 //! The CAN buses, their CANopen devices and drives.
 
+use std::path::PathBuf;
+
 use profile_cia402::eds::drive::Pdo;
 use profile_cia402::master::config::{Expected, GuardingConfig, Stamp, Write};
 use profile_cia402::wire::NodeId;
@@ -53,6 +55,8 @@ pub struct CanDevice {
     pub expected: Expected,
     /// How it gets its node-id, where it has none.
     pub lss: Option<Lss>,
+    /// Its data sheet, by which it is checked before it is there.
+    pub eds: Option<PathBuf>,
     /// What it is given at its boot-up.
     pub file: Option<DeviceFile>,
     /// Whether it keeps that.

@@ -48,6 +48,7 @@ pub(super) fn load(folder: &Path, written: &mut Written, findings: &mut Findings
     for (bus, table) in config.can.iter_mut().zip(&file.south.get_ref().can) {
         for (device, table) in bus.devices.iter_mut().zip(&table.get_ref().device) {
             let table = table.get_ref();
+            device.eds = device.eds.take().map(|path| folder.join(path));
             if let Some(path) = &table.configuration {
                 let path = folder.join(path.get_ref());
                 good &= Loader { text, table, path: &path, device, findings }.load().is_some();
@@ -269,7 +270,7 @@ fn stamp(writes: &[Write]) -> Stamp {
 }
 
 /// Whether a line is the head of a section that only data sheets have.
-fn is_of_a_data_sheet(line: &str) -> bool {
+pub(crate) fn is_of_a_data_sheet(line: &str) -> bool {
     let Some(name) = line.trim().strip_prefix('[').and_then(|rest| rest.split(']').next()) else {
         return false;
     };
@@ -287,11 +288,11 @@ fn counts(diagnostic: &Diagnostic) -> bool {
 }
 
 /// A file as it is shown: with the lines that its reader counts.
-fn shown(bytes: &[u8]) -> String {
+pub(crate) fn shown(bytes: &[u8]) -> String {
     eds::plain(bytes).replace("\r\n", "\n").replace('\r', "\n")
 }
 
-fn problem(source: &Source, code: Code, diagnostic: &Diagnostic) -> Problem {
+pub(crate) fn problem(source: &Source, code: Code, diagnostic: &Diagnostic) -> Problem {
     let at = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
     let span = source.rest_of_line(at(diagnostic.line), at(diagnostic.column)).unwrap_or(0..0);
     let place = if diagnostic.place.is_empty() { code.title() } else { &diagnostic.place };
@@ -301,7 +302,7 @@ fn problem(source: &Source, code: Code, diagnostic: &Diagnostic) -> Problem {
 }
 
 /// The section of an object in a text; its beginning where there is none.
-fn place(source: &Source, object: Mux) -> core::ops::Range<usize> {
+pub(crate) fn place(source: &Source, object: Mux) -> core::ops::Range<usize> {
     let Mux { index, sub } = object;
     let names = [format!("[{index:04X}sub{sub:X}]"), format!("[{index:04X}]"), format!("[{index:04X}Value]")];
     let find = |name: &String| source.find_line(|line| line.trim().eq_ignore_ascii_case(name));

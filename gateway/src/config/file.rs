@@ -550,6 +550,10 @@ pub struct CanDeviceTable {
     /// LSS if it has none; `"store"`: and it stores it. Default: nothing.
     #[schemars(transform = form::word(&check::can_device::LSS))]
     pub lss: Option<Spanned<String>>,
+    /// Its data sheet: an EDS or DCF of CiA 306. `axisbridge check` compares what the axes need with what the file says that the device
+    /// has. Nothing of it is written to the device. A path relative to the folder of this file. Default: none.
+    #[schemars(transform = form::path)]
+    pub eds: Option<Spanned<String>>,
     /// Its configuration, written at boot-up before anything else: a device configuration file (DCF) of CiA 306, or a concise one as in
     /// 1F22. A path relative to the folder of this file. Default: none.
     #[schemars(transform = form::path)]

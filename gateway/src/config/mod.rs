@@ -8,7 +8,7 @@ mod axis;
 mod can;
 mod check;
 mod device;
-mod device_file;
+pub(crate) mod device_file;
 mod devicenet;
 pub(crate) mod duration;
 mod elsewhere;

@@ -2,8 +2,9 @@
 
 use profile_cia402::drive::State;
 use profile_cia402::drive::index::{AXIS_OFFSET, GEAR_RATIO};
+use profile_cia402::eds::DeviceDescription;
 use profile_cia402::node::dictionary::Group;
-use profile_cia402::node::drive::{Axis, Device, DeviceError, identity};
+use profile_cia402::node::drive::{Axis, Device, DeviceError, identity, identity_of};
 use profile_cia402::node::{Config, Node};
 use profile_cia402::wire::NodeId;
 use profile_cia402::wire::nmt::NmtState;
@@ -45,7 +46,7 @@ pub fn drive_with(
     axes: u8,
     setup: &Setup,
 ) -> Result<DriveNode, DeviceError> {
-    made(node, axes, setup, |config| config.identity.serial = serial)
+    made(node, axes, setup, None, |config| config.identity.serial = serial)
 }
 
 /// A device that stands in for one of a configuration, with so many axes: it is what the configuration expects it to be. One that
@@ -54,7 +55,7 @@ pub fn drive_with(
 /// # Errors
 /// Another number of axes than 1 to 8.
 pub fn stand_in(node: NodeId, axes: u8, device: Option<&CanDevice>) -> Result<DriveNode, DeviceError> {
-    made(Some(node), axes, &Setup::default(), |config| {
+    made(Some(node), axes, &Setup::default(), None, |config| {
         let Some(device) = device else { return };
         let (own, expected) = (&mut config.identity, device.expected);
         let numbers = [
@@ -71,10 +72,25 @@ pub fn stand_in(node: NodeId, axes: u8, device: Option<&CanDevice>) -> Result<Dr
     })
 }
 
+/// A device with the objects of a data sheet, and with as many axes as that has.
+///
+/// # Errors
+/// Another number of axes than 1 to 8, or one that cannot work.
+pub(super) fn like(
+    node: Option<NodeId>,
+    serial: u32,
+    axes: u8,
+    setup: &Setup,
+    sheet: DeviceDescription,
+) -> Result<DriveNode, DeviceError> {
+    made(node, axes, setup, Some(sheet), |config| config.identity.serial = serial)
+}
+
 fn made(
     node: Option<NodeId>,
     axes: u8,
     setup: &Setup,
+    sheet: Option<DeviceDescription>,
     change: impl FnOnce(&mut Config),
 ) -> Result<DriveNode, DeviceError> {
     let numbers = 1..=u16::from(axes);
@@ -87,7 +103,14 @@ fn made(
         has_mapping: true,
     };
     change(&mut config);
-    let mut node = Node::new(&config, Device::new(&servos)?);
+    let device = match sheet {
+        None => Device::new(&servos)?,
+        Some(sheet) => {
+            config.identity = identity_of(&sheet, config.identity);
+            Device::like(&servos, sheet, node.map_or(0, NodeId::get))?
+        }
+    };
+    let mut node = Node::new(&config, device);
     let gears = numbers.filter_map(|axis| setup.gear(axis).map(|gear| (axis - 1, gear)));
     for (number, (motor, load)) in gears {
         let index = GEAR_RATIO + number * AXIS_OFFSET;

@@ -20,6 +20,7 @@ use profile_sercos::wire::scp::{ScpClass, ScpEntry};
 use super::drive_events::console::Director;
 use super::drive_events::setup::Setup;
 use super::drive_events::{Change, Shown, SimulatedDrives};
+use super::sercos_twin::Twin;
 use crate::capture::Side;
 use crate::capture::recorder::Tap;
 use crate::config::{AxisKind, Config, DriveAt, Sercos};
@@ -78,7 +79,7 @@ pub fn linear() -> ServoParameters {
 /// Never with the servos of this module; a test builds both.
 #[must_use]
 pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
-    let network = built(drives, ring, communication::CLASSES, &[], &Setup::default());
+    let network = built(drives, ring, communication::CLASSES, &[], &Setup::default(), None);
     network.expect("the servos of this module work")
 }
 
@@ -88,7 +89,7 @@ pub fn drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> 
 /// Never with the servos of this module.
 #[must_use]
 pub fn hot_plug_drives(drives: impl IntoIterator<Item = (u16, UnitKind)>, ring: bool) -> DriveNetwork {
-    let network = built(drives, ring, communication::CLASSES_WITH_HOT_PLUG, &[], &Setup::default());
+    let network = built(drives, ring, communication::CLASSES_WITH_HOT_PLUG, &[], &Setup::default(), None);
     network.expect("the servos of this module work")
 }
 
@@ -98,6 +99,7 @@ fn built(
     classes: &'static [ScpEntry],
     fixed: &'static [FixedConnection],
     setup: &Setup,
+    twin: Option<&Twin>,
 ) -> Result<DriveNetwork, DriveError> {
     let slaves = drives.into_iter().map(|(address, kind)| {
         let servo = match kind {
@@ -105,7 +107,11 @@ fn built(
             UnitKind::Linear => linear(),
         };
         let servo = setup.servo(address, servo);
-        let drive = Drive::new(servo).map_err(|error| DriveError { address, error })?;
+        let drive = match twin {
+            None => Drive::new(servo),
+            Some(twin) => Drive::like(servo, twin.given().to_vec()),
+        };
+        let drive = drive.map_err(|error| DriveError { address, error })?;
         let [low, high] = address.to_le_bytes();
         let mac = [0x02, 0x41, 0x42, 0x01, high, low];
         let config = SlaveConfig {
@@ -120,6 +126,9 @@ fn built(
         if let Some((motor, load)) = setup.gear(address) {
             slave.preset(Idn::INPUT_REVOLUTIONS_OF_LOAD_GEAR, i64::from(motor));
             slave.preset(Idn::OUTPUT_REVOLUTIONS_OF_LOAD_GEAR, i64::from(load));
+        }
+        if let Some(twin) = twin {
+            twin.name(slave.store_mut());
         }
         Ok(slave)
     });
@@ -172,6 +181,20 @@ impl DriveLine {
         kind: &LineKind,
         setup: &Setup,
     ) -> Result<Self, DriveError> {
+        Self::like(drives, ring, kind, setup, None)
+    }
+
+    /// The same, each of them like the drive of a backup, where one is given.
+    ///
+    /// # Errors
+    /// A drive cannot work with what `setup` makes of it.
+    pub fn like(
+        drives: impl IntoIterator<Item = (u16, UnitKind)>,
+        ring: bool,
+        kind: &LineKind,
+        setup: &Setup,
+        twin: Option<&Twin>,
+    ) -> Result<Self, DriveError> {
         let mut drives = drives.into_iter().peekable();
         let first = drives.peek().map_or(1, |(address, _)| *address);
         let (classes, fixed): (_, &'static [FixedConnection]) = match kind {
@@ -184,12 +207,18 @@ impl DriveLine {
                 (FIXED_CLASSES, vec![list(false, to), list(true, from)].leak())
             }
         };
-        Ok(Self { network: built(drives, ring, classes, fixed, setup)?, first })
+        Ok(Self { network: built(drives, ring, classes, fixed, setup, twin)?, first })
     }
 
     /// The drives and their cables.
     pub fn network_mut(&mut self) -> &mut DriveNetwork {
         &mut self.network
+    }
+
+    /// The same, without the line.
+    #[must_use]
+    pub fn into_network(self) -> DriveNetwork {
+        self.network
     }
 
     fn index(&self, drive: u16) -> Option<usize> {

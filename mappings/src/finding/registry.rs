@@ -124,7 +124,7 @@ pub fn page() -> String {
 
 /// Notes that report a fact and ask for nothing.
 pub const FACTS: &[Code] =
-    &[ROW_NUMBERS, REQUIRED_UNSERVED, MODE_UNSERVED, DRIVE_SCALING, DRIVE_MAPPING, FACT_ACCEPTED];
+    &[ROW_NUMBERS, REQUIRED_UNSERVED, MODE_UNSERVED, DRIVE_SCALING, DRIVE_MAPPING, FACT_ACCEPTED, SHEET_NOTE];
 
 macro_rules! registry {
     ($($name:ident = $number:literal $severity:ident $title:literal: $explanation:literal, $example:literal, $remedy:literal;)*) => {
@@ -486,15 +486,39 @@ registry! {
         "65535 stands in the examples for a vendor ID that is still to be assigned. It is good for tests on your own network, and not for a product.",
         "[device.identity]\nvendor_id = 65_535",
         "Use the vendor ID that ODVA has assigned to you, or write `# accept: reason` next to the key.";
+    DATA_SHEET = 93 Error "a data sheet that is not that of the device":
+        "The file that `eds` of a [[south.can.device]] names cannot be read as a data sheet, or the device that it describes is not the one of the configuration: another vendor-ID, product code, revision number or device profile. Axisbridge does not control such a device.",
+        "[[south.can.device]]\nnode = 1\nidentity = { product_code = 7 }\neds = \"of-another-drive.eds\"",
+        "Name the data sheet that belongs to the device and to its firmware, or correct `identity`.";
+    SHEET_LACKS = 94 Error "a device that lacks what the configuration needs":
+        "By its data sheet, the device does not have a mode of operation, an object, an access or a bit rate that it would be commissioned with. Axisbridge would leave it out at start, for the shown reason.",
+        "[[south.can.drive]]\nname = \"fan\"\nnode = 1\nmodes = [\"position\"] # a frequency converter has vl only",
+        "Change what the configuration asks of the drive, or use another drive. If the data sheet is wrong, say in the configuration what the drive has (`drive_modes`, `counts`, `guarding`), or remove `eds`.";
     SCRIPT = 95 Error "a script that cannot be run":
         "A step of a script for the simulated controller, or an event of a script for simulated drives, is unknown or cannot be executed.",
         "[[step]]\nenabel = 1",
         "Correct the step. docs/reference/scripts.md lists the steps, and docs/tasks/simulate-drives-and-controllers.md the events.";
-    STARTUP = 96 Error "an entry of a start-up list that cannot be used":
+    SHEET_PDOS = 96 Error "PDOs that cannot carry what the axis needs":
+        "By the data sheet, a PDO that the axis needs does not exist, has no room, cannot carry an object, has a fixed mapping without it, or takes none of the transmission types. Axisbridge would leave the device out at start.",
+        "[[south.can.drive]]\nname = \"a\"\nnode = 1\nmodes = [\"position\", \"velocity\", \"torque\"] # with two PDOs of fixed mapping",
+        "Ask for fewer modes, `actual_values` and `offsets`. Map the PDOs with the maker's tool where their mapping is fixed.";
+    SHEET_WITHOUT = 97 Warning "a drive that does without something":
+        "By its data sheet, the drive does not take a step of its commissioning, a mode, an actual value or a transmission type. The axis works without it, and the gateway logs it at start.",
+        "[60C2sub1]\nAccessType=ro",
+        "Check that the axis can do without. What the gateway cannot write must be set in the drive with the maker's tool.";
+    SHEET_SILENT = 98 Warning "a data sheet that does not say what it should":
+        "The file has no value for something that commissioning depends on: the modes of operation, or what a count is. It is only known when the drive is there.",
+        "[6502]\nParameterName=Supported drive modes\nDataType=0x0007\nAccessType=ro",
+        "Look it up in the manual, and say it in the configuration (`drive_modes`, `counts`).";
+    SHEET_NOTE = 99 Note "parameters that the drive does not have":
+        "By its data sheet, the drive has no objects for these parameters of the tables. The CIP attributes that stand for them are refused, kept or computed as the tables say; `axisbridge attributes` lists them.",
+        "[[axis]]\nname = \"fan\"\ndrive = \"converter\" # without 60E0 and 60E1",
+        "Nothing, unless the controller needs one of the attributes.";
+    STARTUP = 100 Error "an entry of a start-up list that cannot be used":
         "The start-up list of a drive says what its parameters have to be before it takes part in the cycle. The entry is for another kind of drive or another axis, its value cannot be that of the parameter, nobody says the type of the object, or it names what Axisbridge itself writes: cyclic values, communication, operation modes, and what the tables write at commissioning.",
         "[[south.sercos.drive.startup]]\nparameter = \"S-0-0047\"\nvalue = 0",
         "Correct the entry, or remove it. docs/tasks/set-drive-parameters-at-start.md says which key sets what Axisbridge writes.";
-    STARTUP_ODD = 97 Warning "an entry of a start-up list with something odd":
+    STARTUP_ODD = 101 Warning "an entry of a start-up list with something odd":
         "The backup that is used as a start-up list has parameters that Axisbridge sets itself, which are left out of the list, or parameters that could not be read when it was made; or the value of an entry does not fit what the dictionary says of the parameter, where the drive may say otherwise.",
         "[[south.sercos.drive]]\nstartup_file = \"drive-a.toml\" # with S-0-0032",
         "Nothing if the list is as you meant it. Otherwise correct it.";

@@ -12,6 +12,7 @@
 //! files that lely's dcfgen writes) and what PyPI's canopen makes of them. Of `CompactPDO` no source says more than that it is a
 //! set of bits: bit n is taken for sub-index n + 1 of the communication parameters.
 
+mod access;
 pub mod concise;
 mod data_type;
 mod description;

@@ -7,6 +7,8 @@ use crate::wire::{AbortCode, Mux, NodeId};
 /// Type of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum DataType {
+    /// BOOLEAN, in a byte.
+    Bool,
     /// INTEGER8.
     I8,
     /// INTEGER16.
@@ -19,8 +21,34 @@ pub enum DataType {
     U16,
     /// UNSIGNED32.
     U32,
+    /// INTEGER24.
+    I24,
+    /// INTEGER40.
+    I40,
+    /// INTEGER48.
+    I48,
+    /// INTEGER56.
+    I56,
+    /// INTEGER64.
+    I64,
+    /// UNSIGNED24.
+    U24,
+    /// UNSIGNED40.
+    U40,
+    /// UNSIGNED48.
+    U48,
+    /// UNSIGNED56.
+    U56,
+    /// UNSIGNED64, as the bits of a number with sign.
+    U64,
+    /// REAL32, as its bits.
+    F32,
+    /// REAL64, as its bits.
+    F64,
     /// VISIBLE_STRING.
     Text,
+    /// OCTET_STRING.
+    Octets,
     /// DOMAIN: any bytes.
     Domain,
 }
@@ -30,54 +58,117 @@ impl DataType {
     #[must_use]
     pub const fn code(self) -> u16 {
         match self {
+            Self::Bool => 0x01,
             Self::I8 => 0x02,
             Self::I16 => 0x03,
             Self::I32 => 0x04,
             Self::U8 => 0x05,
             Self::U16 => 0x06,
             Self::U32 => 0x07,
+            Self::I24 => 0x10,
+            Self::I40 => 0x12,
+            Self::I48 => 0x13,
+            Self::I56 => 0x14,
+            Self::I64 => 0x15,
+            Self::U24 => 0x16,
+            Self::U40 => 0x18,
+            Self::U48 => 0x19,
+            Self::U56 => 0x1A,
+            Self::U64 => 0x1B,
+            Self::F32 => 0x08,
+            Self::F64 => 0x11,
             Self::Text => 0x09,
+            Self::Octets => 0x0A,
             Self::Domain => 0x0F,
         }
     }
 
-    /// Bytes of a number; 0 for text and domains.
+    /// All of them.
+    pub const ALL: [Self; 22] = [
+        Self::Bool,
+        Self::I8,
+        Self::I16,
+        Self::I24,
+        Self::I32,
+        Self::I40,
+        Self::I48,
+        Self::I56,
+        Self::I64,
+        Self::U8,
+        Self::U16,
+        Self::U24,
+        Self::U32,
+        Self::U40,
+        Self::U48,
+        Self::U56,
+        Self::U64,
+        Self::F32,
+        Self::F64,
+        Self::Text,
+        Self::Octets,
+        Self::Domain,
+    ];
+
+    /// Whether its values have no fixed length.
+    #[must_use]
+    pub const fn is_bytes(self) -> bool {
+        matches!(self, Self::Text | Self::Octets | Self::Domain)
+    }
+
+    /// Bytes of a number; 0 for text, octets and domains.
     #[must_use]
     pub const fn size(self) -> usize {
         match self {
-            Self::I8 | Self::U8 => 1,
+            Self::Bool | Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 => 4,
-            Self::Text | Self::Domain => 0,
+            Self::I24 | Self::U24 => 3,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I40 | Self::U40 => 5,
+            Self::I48 | Self::U48 => 6,
+            Self::I56 | Self::U56 => 7,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+            Self::Text | Self::Octets | Self::Domain => 0,
         }
     }
 
-    /// The least and the largest number; 0 and 0 for text and domains.
+    /// Whether its numbers have a sign. Those of 64 bits are kept as such.
+    const fn is_signed(self) -> bool {
+        matches!(
+            self,
+            Self::I8
+                | Self::I16
+                | Self::I24
+                | Self::I32
+                | Self::I40
+                | Self::I48
+                | Self::I56
+                | Self::I64
+                | Self::U64
+                | Self::F64
+        )
+    }
+
+    /// The least and the largest number; 0 and 0 for text, octets and domains.
     #[must_use]
     pub const fn range(self) -> (i64, i64) {
-        match self {
-            Self::I8 => (i8::MIN as i64, i8::MAX as i64),
-            Self::I16 => (i16::MIN as i64, i16::MAX as i64),
-            Self::I32 => (i32::MIN as i64, i32::MAX as i64),
-            Self::U8 => (0, u8::MAX as i64),
-            Self::U16 => (0, u16::MAX as i64),
-            Self::U32 => (0, u32::MAX as i64),
-            Self::Text | Self::Domain => (0, 0),
+        let bits = 8 * self.size();
+        match (self, bits) {
+            (Self::Bool, _) => (0, 1),
+            (_, 0) => (0, 0),
+            (_, 64) => (i64::MIN, i64::MAX),
+            (_, bits) if self.is_signed() => (-(1 << (bits - 1)), (1 << (bits - 1)) - 1),
+            (_, bits) => (0, (1 << bits) - 1),
         }
     }
 
     /// The number in `bytes`, little endian; `None` unless there are exactly as many as the type has.
     #[must_use]
     pub fn number(self, bytes: &[u8]) -> Option<i64> {
-        Some(match (self, bytes) {
-            (Self::U8, &[a]) => i64::from(a),
-            (Self::I8, &[a]) => i64::from(i8::from_le_bytes([a])),
-            (Self::U16, &[a, b]) => i64::from(u16::from_le_bytes([a, b])),
-            (Self::I16, &[a, b]) => i64::from(i16::from_le_bytes([a, b])),
-            (Self::U32, &[a, b, c, d]) => i64::from(u32::from_le_bytes([a, b, c, d])),
-            (Self::I32, &[a, b, c, d]) => i64::from(i32::from_le_bytes([a, b, c, d])),
-            _ => return None,
-        })
+        let size = self.size();
+        let negative = self.is_signed() && bytes.last().is_some_and(|last| last & 0x80 != 0);
+        let mut wide = [if negative { 0xFF } else { 0 }; 8];
+        wide.get_mut(..size).filter(|place| place.len() == bytes.len() && size > 0)?.copy_from_slice(bytes);
+        Some(i64::from_le_bytes(wide))
     }
 }
 
@@ -90,6 +181,16 @@ pub enum Access {
     ReadOnly,
     /// The master reads and writes it.
     ReadWrite,
+    /// The master writes it and cannot read it.
+    WriteOnly,
+}
+
+impl Access {
+    /// Whether the master may write it.
+    #[must_use]
+    pub const fn writes(self) -> bool {
+        matches!(self, Self::ReadWrite | Self::WriteOnly)
+    }
 }
 
 /// Which PDOs may carry an object.
@@ -230,6 +331,8 @@ pub struct Entry {
     /// What a reset gives back.
     stored: i64,
     bytes: Vec<u8>,
+    /// Nobody but the device itself finds it.
+    is_hidden: bool,
 }
 
 impl Entry {
@@ -243,6 +346,12 @@ impl Entry {
     #[must_use]
     pub const fn definition(&self) -> &Definition {
         &self.definition
+    }
+
+    /// Whether only the device itself has to do with it: no client finds it, and no PDO carries it.
+    #[must_use]
+    pub const fn is_hidden(&self) -> bool {
+        self.is_hidden
     }
 
     /// Its number; 0 for text and domains.
@@ -259,7 +368,7 @@ impl Entry {
 
     fn default(&self, node: Option<NodeId>) -> i64 {
         let node = node.filter(|_| self.definition.adds_node);
-        self.definition.default + node.map_or(0, |node| i64::from(node.get()))
+        self.definition.default.saturating_add(node.map_or(0, |node| i64::from(node.get())))
     }
 }
 
@@ -358,7 +467,7 @@ impl Dictionary {
         let (content, capacity) = definition.bytes;
         let mut bytes = Vec::with_capacity(capacity.max(content.len()));
         bytes.extend_from_slice(content);
-        let mut entry = Entry { mux, definition, number: 0, stored: 0, bytes };
+        let mut entry = Entry { mux, definition, number: 0, stored: 0, bytes, is_hidden: false };
         entry.stored = entry.default(self.node);
         entry.number = entry.stored;
         self.keys.insert(place, key(mux));
@@ -376,6 +485,43 @@ impl Dictionary {
     pub fn make_constant(&mut self, which: impl Fn(u16) -> bool) {
         let entries = self.entries.iter_mut().filter(|entry| which(entry.mux.index));
         entries.for_each(|entry| entry.definition.access = Access::Constant);
+    }
+
+    /// The node-id that is added to identifiers; 0 without.
+    #[must_use]
+    pub fn node_number(&self) -> u8 {
+        self.node.map_or(0, NodeId::get)
+    }
+
+    /// Keeps all entries for the device itself: for clients there are none until [`Dictionary::redefine`] or [`Dictionary::add`]
+    /// makes them known again.
+    pub fn hide_all(&mut self) {
+        self.objects.clear();
+        self.entries.iter_mut().for_each(|entry| entry.is_hidden = true);
+    }
+
+    /// Removes the entries of these objects.
+    pub fn remove(&mut self, which: impl Fn(u16) -> bool) {
+        self.objects.retain(|object| !which(object.index));
+        self.entries.retain(|entry| !which(entry.mux.index));
+        self.keys = self.entries.iter().map(|entry| key(entry.mux)).collect();
+    }
+
+    /// Gives an entry that is there another definition and shows it to clients. It has its default again.
+    pub fn redefine(&mut self, handle: Handle, definition: Definition) {
+        let node = self.node;
+        let entry = &mut self.entries[handle.0];
+        (entry.definition, entry.is_hidden) = (definition, false);
+        entry.stored = entry.default(node);
+        entry.number = entry.stored;
+    }
+
+    /// Gives an entry another default, and that number.
+    pub fn set_default(&mut self, handle: Handle, number: i64) {
+        let entry = &mut self.entries[handle.0];
+        let (low, high) = entry.definition.data_type.range();
+        (entry.definition.default, entry.definition.adds_node) = (number.clamp(low, high), false);
+        (entry.number, entry.stored) = (entry.definition.default, entry.definition.default);
     }
 
     /// The objects, ascending.
@@ -416,7 +562,7 @@ impl Dictionary {
     pub fn look_up(&self, mux: Mux) -> Result<Handle, AbortCode> {
         let missing =
             if self.object(mux.index).is_some() { AbortCode::NO_SUB_INDEX } else { AbortCode::NO_OBJECT };
-        self.find(mux).ok_or(missing)
+        self.find(mux).filter(|handle| !self.entries[handle.0].is_hidden).ok_or(missing)
     }
 
     /// The number of an entry; 0 when there is none.
@@ -453,6 +599,15 @@ impl Dictionary {
     pub fn fill(&mut self, mux: Mux, bytes: &[u8]) {
         if let Some(handle) = self.find(mux) {
             self.entries[handle.0].bytes = bytes.to_vec();
+        }
+    }
+
+    /// The same, with room for as many bytes as a client may write.
+    pub fn fill_within(&mut self, mux: Mux, bytes: &[u8], capacity: usize) {
+        if let Some(handle) = self.find(mux) {
+            let mut content = Vec::with_capacity(capacity.max(bytes.len()));
+            content.extend_from_slice(bytes);
+            self.entries[handle.0].bytes = content;
         }
     }
 

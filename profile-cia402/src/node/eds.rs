@@ -73,7 +73,9 @@ fn objects(text: &mut String, dictionary: &Dictionary) -> std::fmt::Result {
 }
 
 fn one_object(text: &mut String, dictionary: &Dictionary, object: &Object) -> std::fmt::Result {
-    let parts = || dictionary.entries().iter().filter(|entry| entry.mux().index == object.index);
+    let parts = || {
+        dictionary.entries().iter().filter(|entry| entry.mux().index == object.index && !entry.is_hidden())
+    };
     writeln!(text, "[{:04X}]\nParameterName={}", object.index, object.name)?;
     let is_domain = parts().any(|entry| entry.definition().data_type == DataType::Domain);
     let code = match object.shape {
@@ -110,6 +112,7 @@ fn one_entry(text: &mut String, entry: &Entry) -> std::fmt::Result {
     let access = match (definition.access, definition.mapping) {
         (Access::Constant, _) => "const",
         (Access::ReadOnly, _) => "ro",
+        (Access::WriteOnly, _) => "wo",
         (Access::ReadWrite, Mapping::None | Mapping::Both) => "rw",
         (Access::ReadWrite, Mapping::Tpdo) => "rwr",
         (Access::ReadWrite, Mapping::Rpdo) => "rww",
@@ -117,12 +120,10 @@ fn one_entry(text: &mut String, entry: &Entry) -> std::fmt::Result {
     writeln!(text, "DataType={:#06X}\nAccessType={access}", definition.data_type.code())?;
     match definition.data_type {
         DataType::Text => writeln!(text, "DefaultValue={}", String::from_utf8_lossy(entry.bytes()))?,
-        DataType::Domain => {}
+        DataType::Domain | DataType::Octets | DataType::F32 | DataType::F64 => {}
         data_type => {
             let (lowest, highest) = data_type.range();
-            if (definition.low, definition.high) != (lowest, highest)
-                && definition.access == Access::ReadWrite
-            {
+            if (definition.low, definition.high) != (lowest, highest) && definition.access.writes() {
                 writeln!(text, "LowLimit={}\nHighLimit={}", definition.low, definition.high)?;
             }
             match (definition.adds_node, data_type) {

@@ -3,7 +3,7 @@
 use super::application::Application;
 use super::communication;
 use super::consumer::Consumers;
-use super::dictionary::{Access, DataType, Definition, Dictionary};
+use super::dictionary::{Access, Definition, Dictionary};
 use super::pdo::{self, Pdo};
 use crate::generated::objects;
 use crate::sdo::server::ObjectAccess;
@@ -21,6 +21,9 @@ pub(super) struct Gate<'a, A> {
 impl<A: Application> ObjectAccess for Gate<'_, A> {
     fn read(&mut self, object: Mux, into: &mut [u8]) -> Result<usize, AbortCode> {
         let entry = self.dictionary.entry(self.dictionary.look_up(object)?);
+        if entry.definition().access == Access::WriteOnly {
+            return Err(AbortCode::WRITE_ONLY);
+        }
         if object.index == objects::PRE_DEFINED_ERROR_FIELD
             && i64::from(object.sub) > self.dictionary.number(objects::PRE_DEFINED_ERROR_FIELD, 0)
         {
@@ -28,7 +31,7 @@ impl<A: Application> ObjectAccess for Gate<'_, A> {
         }
         let number = entry.number().to_le_bytes();
         let bytes = match entry.definition().data_type {
-            DataType::Text | DataType::Domain => entry.bytes(),
+            data_type if data_type.is_bytes() => entry.bytes(),
             data_type => &number[..data_type.size()],
         };
         into.get_mut(..bytes.len()).ok_or(AbortCode::OUT_OF_MEMORY)?.copy_from_slice(bytes);
@@ -37,12 +40,12 @@ impl<A: Application> ObjectAccess for Gate<'_, A> {
 
     fn write_begins(&mut self, object: Mux, size: Option<u32>) -> Result<usize, AbortCode> {
         let definition = self.dictionary.entry(self.dictionary.look_up(object)?).definition();
-        if definition.access != Access::ReadWrite {
+        if !definition.access.writes() {
             return Err(AbortCode::READ_ONLY);
         }
         let size = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
         let (least, most) = match definition.data_type {
-            DataType::Text | DataType::Domain => (0, definition.bytes.1),
+            data_type if data_type.is_bytes() => (0, definition.bytes.1),
             data_type => (data_type.size(), data_type.size()),
         };
         match size {
@@ -55,10 +58,10 @@ impl<A: Application> ObjectAccess for Gate<'_, A> {
     fn write(&mut self, object: Mux, data: &[u8]) -> Result<(), AbortCode> {
         let handle = self.dictionary.look_up(object)?;
         let definition = self.dictionary.entry(handle).definition();
-        if definition.access != Access::ReadWrite {
+        if !definition.access.writes() {
             return Err(AbortCode::READ_ONLY);
         }
-        if matches!(definition.data_type, DataType::Text | DataType::Domain) {
+        if definition.data_type.is_bytes() {
             if data.len() > definition.bytes.1 {
                 return Err(AbortCode::TOO_LONG);
             }

@@ -8,7 +8,7 @@ use profile_generic::can::Id;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::communication::is_free;
-use super::dictionary::{Access, DataType, Definition, Dictionary, Handle, Mapping, Object, Shape};
+use super::dictionary::{DataType, Definition, Dictionary, Handle, Mapping, Object, Shape};
 use crate::wire::cob_id::CobId;
 use crate::wire::pdo::{
     Direction, MappingEntry, PDO_LEN_MAX, RPDO_COMMUNICATION, SUB_COB_ID, SUB_EVENT_TIMER, SUB_INHIBIT,
@@ -285,7 +285,7 @@ impl Pdo {
             at = end;
             let (Some(handle), Some(number)) = (mapped.handle, number) else { continue };
             let definition = dictionary.entry(handle).definition();
-            let writable = definition.access == Access::ReadWrite;
+            let writable = definition.access.writes();
             if writable && (definition.low..=definition.high).contains(&number) {
                 dictionary.set_number(handle, number);
             }

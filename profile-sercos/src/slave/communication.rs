@@ -255,7 +255,8 @@ pub fn define_lists(store: &mut Store) {
     // What somebody sets and the drive keeps: not what a master writes for its telegrams, nor what comes in them.
     let kept = |p: &Parameter| {
         let set = p.write_protection(Phase::CP2).is_none() && !p.attribute().is_command();
-        set && p.cyclic() == Cyclic::No && p.idn().block() < 1000
+        // Standard parameters from 1000 on are those of the communication.
+        set && p.cyclic() == Cyclic::No && (p.idn().is_product() || p.idn().block() < 1000)
     };
     let backup = list(&kept, &[]);
     for (idn, name, data) in [

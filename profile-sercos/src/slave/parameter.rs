@@ -2,6 +2,8 @@
 //!
 //! Everything is allocated when parameters are defined. Values are changed in place.
 
+use std::borrow::Cow;
+
 use crate::wire::attribute::{Attribute, Format};
 use crate::wire::data_status::DataStatus;
 use crate::wire::header::Phase;
@@ -10,7 +12,7 @@ use crate::wire::procedure::ProcedureControl;
 use crate::wire::svc_error::SvcError;
 
 /// Most parameters of a slave. Bounds the lists of IDNs, which are 4 bytes an entry and 65535 bytes at most.
-pub const PARAMETERS_MAX: usize = 1024;
+pub const PARAMETERS_MAX: usize = 4096;
 
 /// Whether a parameter may be part of a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -34,8 +36,8 @@ pub struct Handle(usize);
 #[derive(Debug, Clone)]
 pub struct Definition {
     idn: Idn,
-    name: &'static str,
-    unit: &'static str,
+    name: Cow<'static, str>,
+    unit: Cow<'static, str>,
     attribute: Attribute,
     minimum: Option<i64>,
     maximum: Option<i64>,
@@ -47,12 +49,12 @@ pub struct Definition {
 }
 
 impl Definition {
-    fn new(idn: Idn, attribute: u32, name: &'static str, data: Vec<u8>) -> Self {
+    fn new(idn: Idn, attribute: u32, name: impl Into<Cow<'static, str>>, data: Vec<u8>) -> Self {
         let capacity = data.len();
         Definition {
             idn,
-            name,
-            unit: "",
+            name: name.into(),
+            unit: Cow::Borrowed(""),
             attribute: Attribute(attribute),
             minimum: None,
             maximum: None,
@@ -77,6 +79,15 @@ impl Definition {
         definition
     }
 
+    /// Operation data of any kind with these bytes, which fit the attribute; `capacity` is the longest length of a list in bytes.
+    pub(super) fn data(idn: Idn, attribute: Attribute, name: String, data: &[u8], capacity: usize) -> Self {
+        let mut definition = Self::new(idn, attribute.0, name, data.to_vec());
+        if attribute.is_list() {
+            definition.capacity = capacity.max(data.len()).min(usize::from(u16::MAX));
+        }
+        definition
+    }
+
     /// A text that only the slave changes.
     pub fn text(idn: Idn, name: &'static str, text: &str, capacity: usize) -> Self {
         Self::list(idn, TEXT_READ_ONLY, name, text.as_bytes(), capacity)
@@ -89,8 +100,8 @@ impl Definition {
 
     /// With a unit, element 4.
     #[must_use]
-    pub fn unit(mut self, unit: &'static str) -> Self {
-        self.unit = unit;
+    pub fn unit(mut self, unit: impl Into<Cow<'static, str>>) -> Self {
+        self.unit = unit.into();
         self
     }
 
@@ -142,8 +153,8 @@ impl Parameter {
     }
 
     /// Element 2.
-    pub fn name(&self) -> &'static str {
-        self.definition.name
+    pub fn name(&self) -> &str {
+        &self.definition.name
     }
 
     /// Element 3.
@@ -152,8 +163,8 @@ impl Parameter {
     }
 
     /// Element 4; empty if there is none.
-    pub fn unit(&self) -> &'static str {
-        self.definition.unit
+    pub fn unit(&self) -> &str {
+        &self.definition.unit
     }
 
     /// Element 5 as a number.
@@ -250,12 +261,14 @@ pub struct Store {
     parameters: Vec<Parameter>,
     /// Positions in `parameters`, sorted by IDN.
     order: Vec<usize>,
+    /// Positions of those that only the slave itself has to do with.
+    hidden: Vec<usize>,
 }
 
 impl Store {
     /// An empty store.
     pub fn new() -> Self {
-        Store { parameters: Vec::new(), order: Vec::new() }
+        Store { parameters: Vec::new(), order: Vec::new(), hidden: Vec::new() }
     }
 
     /// Adds a parameter, or replaces the one with the same IDN.
@@ -301,6 +314,21 @@ impl Store {
         place.is_ok()
     }
 
+    /// Makes it a slave that does not have this parameter, and goes on with its number inside; whether it had it.
+    pub fn hide(&mut self, idn: Idn) -> bool {
+        let place = self.position(idn);
+        if let Ok(at) = place {
+            self.hidden.push(self.order.remove(at));
+        }
+        place.is_ok()
+    }
+
+    /// The parameter with this IDN, also one that is hidden.
+    fn find_inside(&self, idn: Idn) -> Option<Handle> {
+        let hidden = || self.hidden.iter().copied().find(|&index| self.parameters[index].idn() == idn);
+        self.find(idn).or_else(|| hidden().map(Handle))
+    }
+
     /// A parameter by its handle.
     pub fn get(&self, handle: Handle) -> &Parameter {
         &self.parameters[handle.0]
@@ -318,7 +346,7 @@ impl Store {
 
     /// The value of the parameter with this IDN; 0 if there is none.
     pub fn number_of(&self, idn: Idn) -> i64 {
-        self.find(idn).map_or(0, |handle| self.number(handle))
+        self.find_inside(idn).map_or(0, |handle| self.number(handle))
     }
 
     /// Sets a number from inside the slave: no limit and no write protection applies. What does not fit is
@@ -339,7 +367,7 @@ impl Store {
 
     /// Sets the number of the parameter with this IDN, if there is one.
     pub fn set_number_of(&mut self, idn: Idn, value: i64) {
-        if let Some(handle) = self.find(idn) {
+        if let Some(handle) = self.find_inside(idn) {
             self.set_number(handle, value);
         }
     }

@@ -11,6 +11,8 @@ use profile_cia402::master::config::{
     Expected, HeartbeatConfig, MasterConfig, MasterHeartbeat, NodeConfig, PdoConfig, SyncConfig,
 };
 use profile_cia402::master::event::{Event, Output};
+use profile_cia402::node::drive::{Device as Twin, identity, identity_of};
+use profile_cia402::node::{Config as NodeSettings, Node};
 use profile_cia402::sdo::client::{Client, ClientConfig};
 use profile_cia402::sdo::request::{INLINE_LEN, Method, SdoData, SdoRequest};
 use profile_cia402::sdo::server::{ObjectAccess, Server, ServerConfig};
@@ -22,7 +24,9 @@ use profile_cia402::wire::pdo::MappingEntry;
 use profile_cia402::wire::sdo::{self as sdo_wire, Abort, BlockSegment, SdoResponse};
 use profile_cia402::wire::sync::Sync;
 use profile_cia402::wire::time::TimeOfDay;
-use profile_cia402::wire::{AbortCode, Function, Mux, NodeId};
+use profile_cia402::wire::{self, AbortCode, Function, Mux, NodeId, cob_id};
+use profile_generic::can::Id;
+use profile_generic::servo::ServoParameters;
 use profile_generic::state::Report;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
@@ -407,6 +411,47 @@ pub fn eds(data: &[u8]) {
     let bytes = configuration.to_bytes();
     assert_eq!(concise_form::parse(&bytes).expect("what was written").len(), configuration.writes.len());
     let _ = (description.is_drive(), description.axes());
+    twin(description);
+}
+
+/// A drive like that of a data sheet: whatever it says, each object is there, is read and written, and time passes.
+fn twin(description: sheet::DeviceDescription) {
+    let Some(last) = description.axes().last().map(|axis| usize::from(axis.number)) else { return };
+    let servos = vec![ServoParameters::default(); last + 1];
+    let config = NodeSettings {
+        node: NodeId::new(DEVICE).ok(),
+        identity: identity_of(&description, identity(servos.len(), 1)),
+        boot_time: DurationNs::from_millis(1),
+        has_blocks: true,
+        has_mapping: true,
+    };
+    let objects: Vec<_> = description.objects.iter().take(200).cloned().collect();
+    let mut node =
+        Node::new(&config, Twin::like(&servos, description, DEVICE).expect("the default servo works"));
+    let mut now = MonotonicTime(1_000_000);
+    let mut pass = |node: &mut Node<Twin>, frame: Option<(Id, [u8; 8], usize)>| {
+        now = now + DurationNs::from_millis(1);
+        match frame {
+            Some((id, data, len)) => node.handle_frame(now, &wire::frame(id, &data[..len])),
+            None => node.handle_time(now),
+        }
+        while node.poll(now).is_some() {}
+    };
+    (0..30).for_each(|_| pass(&mut node, None));
+    let request = NodeId::new(DEVICE).map(cob_id::sdo_request).expect("a node-id");
+    for object in &objects {
+        let [low, high] = object.index.to_le_bytes();
+        for sub in object.subs.iter().take(9) {
+            pass(&mut node, Some((request, [0x40, low, high, sub.sub, 0, 0, 0, 0], 8)));
+            pass(&mut node, Some((request, [0x22, low, high, sub.sub, 0xFF, 0xFF, 0xFF, 0x7F], 8)));
+            pass(&mut node, Some((request, [0x2B, low, high, sub.sub, 0x0F, 0, 0, 0], 8)));
+        }
+    }
+    // Started, with SYNC.
+    pass(&mut node, Some((Id::Standard(0), [1, 0, 0, 0, 0, 0, 0, 0], 2)));
+    for _ in 0..20 {
+        pass(&mut node, Some((Id::Standard(0x80), [0; 8], 0)));
+    }
 }
 
 /// Concise configurations.

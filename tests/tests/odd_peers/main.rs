@@ -4,7 +4,9 @@
 //! A row works when the controller has the axis enabled, moved and disabled, and the drive itself says that it went. A row is
 //! refused when the drive never was enabled and the box named it. The tables are snapshots, texts included.
 
+mod backups;
 mod canopen;
+mod data_sheets;
 mod devicenet;
 mod sercos;
 

@@ -309,6 +309,7 @@ fn a_device_that_has_another_node_id_keeps_it() {
             ..Expected::DRIVE
         },
         lss: None,
+        eds: None,
         file: None,
         stores: false,
         keeps_mapping: false,

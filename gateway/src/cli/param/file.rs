@@ -55,6 +55,18 @@ pub struct Kept {
     /// Its value, for people.
     #[serde(default)]
     pub value: String,
+    /// Its unit, for people and for drives that are like this one.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub unit: String,
+    /// The attribute of an IDN, `0x01110001`; empty where there is none.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub attribute: String,
+    /// The least value; empty where nobody says.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub minimum: String,
+    /// The greatest value; empty where nobody says.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub maximum: String,
     /// Its bytes, two hexadecimal digits each.
     pub data: String,
 }
@@ -71,8 +83,17 @@ pub struct Unread {
 
 impl From<ParameterReport> for Kept {
     fn from(report: ParameterReport) -> Self {
-        let ParameterReport { id, name, value, data, .. } = report;
-        Self { id, name: name.unwrap_or_default(), value, data }
+        let ParameterReport { id, name, value, data, unit, attribute, minimum, maximum, .. } = report;
+        Self {
+            id,
+            name: name.unwrap_or_default(),
+            value,
+            unit: unit.unwrap_or_default(),
+            attribute: attribute.unwrap_or_default(),
+            minimum: minimum.unwrap_or_default(),
+            maximum: maximum.unwrap_or_default(),
+            data,
+        }
     }
 }
 
@@ -190,6 +211,10 @@ mod tests {
             id: "S-0-0104".to_owned(),
             name: "Position loop Kv-factor".to_owned(),
             value: "1.50".to_owned(),
+            unit: "1000/min".to_owned(),
+            attribute: "0x02110001".to_owned(),
+            minimum: "0.01".to_owned(),
+            maximum: "655.35".to_owned(),
             data: "9600".to_owned(),
         };
         let unread = Unread { id: "P-0-0001".to_owned(), why: "the drive refuses it".to_owned() };

@@ -3,7 +3,7 @@
 mod backup;
 mod compare;
 mod drive;
-mod file;
+pub(crate) mod file;
 mod restore;
 mod show;
 

@@ -76,6 +76,9 @@ fn check_device(problems: &mut Problems, table: &CanDeviceTable) -> Option<CanDe
     if let Some(path) = &table.configuration {
         value::path(problems, path, "the configuration of a device");
     }
+    if let Some(path) = &table.eds {
+        value::path(problems, path, "the data sheet of a device");
+    }
     if let (Some(store), None) = (&table.store, &table.configuration) {
         problems.report::<()>(
             store.span(),
@@ -94,6 +97,7 @@ fn check_device(problems: &mut Problems, table: &CanDeviceTable) -> Option<CanDe
         node: NodeId::new(node?).ok()?,
         expected: expected?,
         lss: lss?,
+        eds: table.eds.as_ref().map(|path| path.get_ref().into()),
         // It is read when all of the configuration is good.
         file: None,
         stores: table.store.as_ref().is_some_and(|store| *store.get_ref()),

@@ -24,13 +24,13 @@ pub mod objects;
 mod probe;
 mod profile;
 pub mod scaling;
+mod twin;
 
 use profile_generic::servo::{ServoError, ServoParameters};
 use profile_generic::time::DurationNs;
 
 pub use self::axis::Axis;
 
-use self::objects::MODES;
 use self::scaling::Scales;
 use super::Identity;
 use super::application::{Application, Event, Report};
@@ -38,6 +38,7 @@ use super::dictionary::{Definition, Dictionary};
 use crate::drive::Mode;
 use crate::drive::homing::Method;
 use crate::drive::index::{self, AXES_MAX, AXIS_OFFSET};
+use crate::eds::DeviceDescription;
 use crate::wire::{AbortCode, Mux};
 
 /// A device with one axis or several.
@@ -46,6 +47,10 @@ pub struct Device {
     axes: Vec<Axis>,
     /// Time does not pass for the axes.
     paused: bool,
+    /// The data sheet that it is made by, until its objects are.
+    sheet: Option<Box<DeviceDescription>>,
+    /// It has no object for the time between set-points, and takes that of SYNC (1006h).
+    follows_cycle: bool,
 }
 
 /// Why there is no device.
@@ -62,6 +67,20 @@ pub enum DeviceError {
         /// What is wrong.
         error: ServoError,
     },
+}
+
+/// What a simulated drive that is made by a data sheet says about itself; what the file does not say is as it was.
+#[must_use]
+pub fn identity_of(sheet: &DeviceDescription, otherwise: Identity) -> Identity {
+    let number = |sub| sheet.number(index::IDENTITY, sub, 0).filter(|number| *number != 0);
+    Identity {
+        device_type: sheet.number(index::DEVICE_TYPE, 0, 0).unwrap_or(otherwise.device_type),
+        vendor: number(1).or(sheet.device.vendor_number).unwrap_or(otherwise.vendor),
+        product: number(2).or(sheet.device.product_number).unwrap_or(otherwise.product),
+        revision: number(3).or(sheet.device.revision_number).unwrap_or(otherwise.revision),
+        serial: number(4).unwrap_or(otherwise.serial),
+        ..otherwise
+    }
 }
 
 /// What a simulated drive says about itself.
@@ -93,7 +112,22 @@ impl Device {
             let axis = usize::from(number) + 1;
             Axis::new(number, *servo).map_err(|error| DeviceError::Servo { axis, error })
         });
-        Ok(Self { axes: axes.collect::<Result<_, _>>()?, paused: false })
+        Ok(Self { axes: axes.collect::<Result<_, _>>()?, paused: false, sheet: None, follows_cycle: false })
+    }
+
+    /// A device like the one of a data sheet or device configuration, with a node-id and these servos for its axes: it has the objects
+    /// of the file and no others, with their types, accesses, limits and values, and its mappings of PDOs. What CiA 402 asks of them
+    /// the simulated drive does, in the modes of 6502h; where the file does not say them, in those for which it has objects.
+    ///
+    /// # Errors
+    /// [`DeviceError`].
+    pub fn like(servos: &[ServoParameters], sheet: DeviceDescription, node: u8) -> Result<Self, DeviceError> {
+        let mut device = Self::new(servos)?;
+        for (number, axis) in (0..).zip(&mut device.axes) {
+            axis.take_modes(twin::modes(&sheet, number, node));
+        }
+        device.sheet = Some(Box::new(sheet));
+        Ok(device)
     }
 
     /// Stops the time of the axes, or lets it go on. Objects keep what was written last meanwhile and controlwords have no effect: for
@@ -129,15 +163,21 @@ impl Application for Device {
         dictionary.variable(objects::SCRATCH, Definition::domain("Scratch", objects::SCRATCH_LEN));
         for (number, axis) in (0..AXES_MAX).zip(&mut self.axes) {
             objects::define(dictionary, number, axis.servo().parameters());
+        }
+        if let Some(sheet) = self.sheet.take() {
+            twin::shape(dictionary, &sheet, self.axes.len());
+            self.follows_cycle = sheet.object(index::INTERPOLATION_PERIOD).is_none();
+        }
+        for axis in &mut self.axes {
             axis.adopt(dictionary);
         }
     }
 
     fn check(&self, mux: Mux, number: i64, dictionary: &Dictionary) -> Result<(), AbortCode> {
-        let Some((_, index)) = self.axis_of(mux.index) else { return Ok(()) };
+        let Some((axis, index)) = self.axis_of(mux.index) else { return Ok(()) };
         let small = i8::try_from(number).ok();
         match index {
-            index::MODE if !small.is_some_and(|mode| MODES.has(Mode(mode))) => Err(AbortCode::VALUE),
+            index::MODE if !small.is_some_and(|mode| axis.modes().has(Mode(mode))) => Err(AbortCode::VALUE),
             index::HOMING_METHOD if small.and_then(|method| Method(method).plan()).is_none() => {
                 Err(AbortCode::VALUE)
             }
@@ -158,6 +198,9 @@ impl Application for Device {
     }
 
     fn commanded(&mut self, dictionary: &mut Dictionary) {
+        if self.follows_cycle {
+            twin::follow_cycle(dictionary, self.axes.len());
+        }
         if dictionary.take_changed() {
             self.axes.iter_mut().for_each(|axis| axis.adopt(dictionary));
         }

@@ -23,6 +23,7 @@ pub mod probe;
 pub mod scaling;
 mod set_points;
 mod status;
+mod twin;
 
 use profile_generic::fault::FaultCause;
 use profile_generic::image::StatusBits;
@@ -40,9 +41,10 @@ use self::parameters::MODES;
 use self::probe::Probe;
 use self::scaling::Scales;
 use self::set_points::Path;
+pub use self::twin::Given;
 use super::application::{Application, Cycle, Diagnosis, Order, Progress};
 use super::configuration::Invalid;
-use super::parameter::Store;
+use super::parameter::{Parameter, Store};
 use crate::wire::drive_words::{DriveControl, ReadyState};
 use crate::wire::header::Phase;
 use crate::wire::idn::Idn;
@@ -74,6 +76,8 @@ pub struct Drive {
     homing: Homing,
     /// Time does not pass for motor and loops.
     paused: bool,
+    /// The parameters of the drive that it is like, until its own are made.
+    given: Option<Vec<Given>>,
 }
 
 impl Drive {
@@ -97,7 +101,17 @@ impl Drive {
             probe,
             homing: Homing::default(),
             paused: false,
+            given: None,
         })
+    }
+
+    /// The same with the settings of another drive, and with no other settings. What goes over the bus in every cycle, the procedure
+    /// commands, and the parameters of the communication it has in any case.
+    ///
+    /// # Errors
+    /// As [`Drive::new`].
+    pub fn like(parameters: ServoParameters, given: Vec<Given>) -> Result<Self, ServoError> {
+        Ok(Self { given: Some(given), ..Self::new(parameters)? })
     }
 
     /// The servo, to look at it.
@@ -284,7 +298,12 @@ impl Drive {
 
 impl Application for Drive {
     fn define(&mut self, store: &mut Store) {
+        let communication: Vec<Idn> = store.iter().map(Parameter::idn).collect();
         parameters::define(store, self.servo.parameters());
+        if let Some(given) = self.given.take() {
+            twin::shape(store, &communication, &given, self.servo.parameters());
+            self.adopt(store);
+        }
     }
 
     fn refresh(&mut self, _: Idn, _: &mut Store) {}

@@ -265,7 +265,7 @@ fn define_settings(store: &mut Store) {
 }
 
 /// Gives limits and windows the values of the servo, in the preset scaling.
-fn preset(store: &mut Store, servo: &ServoParameters) {
+pub(super) fn preset(store: &mut Store, servo: &ServoParameters) {
     let Ok(scales) = Scales::read(store, servo) else { return };
     for (idn, value) in [
         (Idn::BIPOLAR_VELOCITY_LIMIT, scales.velocity.counts(servo.velocity_limit.0)),

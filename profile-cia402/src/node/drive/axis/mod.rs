@@ -14,6 +14,7 @@ use profile_generic::time::DurationNs;
 use self::set_points::{Brake, Path};
 use crate::drive::controlword::Command;
 use crate::drive::homing::Method;
+use crate::drive::modes::SupportedModes;
 use crate::drive::options::{AbortConnectionOption, DisableOption, QuickStopOption, ShutdownOption, Stop};
 use crate::drive::states::transition;
 use crate::drive::{Controlword, ErrorCode, Mode, State, Statusword, index};
@@ -110,6 +111,9 @@ pub struct Axis {
     monitor: Monitor,
     reports: ArrayVec<Report, REPORTS_MAX>,
     wiring: Wiring,
+    modes: SupportedModes,
+    /// It has the objects of the simulated drive's own manufacturer.
+    has_own_objects: bool,
 }
 
 impl Axis {
@@ -141,7 +145,20 @@ impl Axis {
                 limit_switches: [Position(i64::MIN), Position(i64::MAX)],
                 ignores_limit_switches: false,
             },
+            modes: MODES,
+            has_own_objects: true,
         })
+    }
+
+    /// Its modes of operation.
+    pub fn modes(&self) -> SupportedModes {
+        self.modes
+    }
+
+    /// Makes it one of another manufacturer, with these of its modes.
+    pub(super) fn take_modes(&mut self, modes: SupportedModes) {
+        self.modes = MODES.intersection(modes);
+        self.has_own_objects = false;
     }
 
     /// The servo, to look at it.
@@ -248,7 +265,11 @@ impl Axis {
             torque_limit: Torque(torque * TORQUE),
             deceleration_limit: Acceleration(quick.max(1)),
             in_position_window: Position(window.max(1)),
-            velocity_feed_forward: self.number(dictionary, FEED_FORWARD) * 1_000,
+            velocity_feed_forward: if self.has_own_objects {
+                self.number(dictionary, FEED_FORWARD) * 1_000
+            } else {
+                self.servo.parameters().velocity_feed_forward
+            },
             ..*self.servo.parameters()
         };
         if parameters != *self.servo.parameters() {
@@ -323,7 +344,7 @@ impl Axis {
     /// Takes controlword, mode and touch probe function. No time passes.
     pub(super) fn command(&mut self, dictionary: &mut Dictionary) {
         let injected = u16::try_from(self.part(dictionary, FAULT_INJECTION, 1)).unwrap_or_default();
-        if injected != 0 {
+        if injected != 0 && self.has_own_objects {
             dictionary.set(FAULT_INJECTION + self.offset, 1, 0);
             self.raise_fault(ErrorCode(injected), dictionary);
         }
@@ -338,7 +359,7 @@ impl Axis {
     fn select_mode(&mut self, dictionary: &mut Dictionary) {
         let wanted = Mode(i8::try_from(self.number(dictionary, index::MODE)).unwrap_or_default());
         // A mode that came by PDO and is not supported changes nothing; by SDO it is refused.
-        if wanted != self.path.mode && MODES.has(wanted) {
+        if wanted != self.path.mode && self.modes.has(wanted) {
             self.path.mode = wanted;
             self.begin_following();
             self.set(dictionary, index::MODE_DISPLAY, i64::from(wanted.0));
