@@ -82,22 +82,23 @@ fn an_integrator_bandwidth_becomes_the_time_constant_of_the_drive() {
     }
 }
 
-/// A drive whose unit of S-0-0101 nobody knows has no Kvi.
+/// A drive that states no unit of S-0-0101, or one that nobody knows, has no Kvi.
 #[test]
 fn a_time_constant_in_a_unit_that_is_not_known_is_not_guessed() {
-    let mut rig = Rig::new(Settings::default());
-    let time = Definition::value(Idn::standard(101), 0x0111_0001, "Velocity loop integral action time", 100);
-    rig.line.slaves_mut()[0].store_mut().define(time.unit("counts"));
-    rig.until_ready();
-    let (mut rig, client) = stopped(rig);
-    let set = client.ask(&mut rig, SET, TURNTABLE, Some(id::KVI), &80.0_f32.to_le_bytes()).0;
-    assert_eq!(
-        (set, client.ask(&mut rig, GET, TURNTABLE, Some(id::KVI), &[]).0),
-        (NOT_SUPPORTED, NOT_SUPPORTED)
-    );
-    assert_eq!(rig.line.slaves()[0].store().number_of(Idn::standard(101)), 100, "as it was");
-    let other = client.ask(&mut rig, GET, SLIDE, Some(id::KVI), &[]);
-    assert_eq!((other.0, real(&other.1)), (OK, 100.0), "the other drive tells its unit");
+    for unit in ["counts", ""] {
+        let mut rig = Rig::new(Settings::default());
+        let time =
+            Definition::value(Idn::standard(101), 0x0111_0001, "Velocity loop integral action time", 100);
+        rig.line.slaves_mut()[0].store_mut().define(time.unit(unit));
+        rig.until_ready();
+        let (mut rig, client) = stopped(rig);
+        let set = client.ask(&mut rig, SET, TURNTABLE, Some(id::KVI), &80.0_f32.to_le_bytes()).0;
+        let get = client.ask(&mut rig, GET, TURNTABLE, Some(id::KVI), &[]).0;
+        assert_eq!((set, get), (NOT_SUPPORTED, NOT_SUPPORTED), "`{unit}`");
+        assert_eq!(rig.line.slaves()[0].store().number_of(Idn::standard(101)), 100, "as it was");
+        let (status, other) = client.ask(&mut rig, GET, SLIDE, Some(id::KVI), &[]);
+        assert_eq!((status, real(&other)), (OK, 100.0), "the other drive states its unit");
+    }
 }
 
 /// Terms that the loops of a drive do not have are 0.

@@ -118,6 +118,6 @@ mod tests {
             ..Tolerances::default()
         };
         assert_eq!(look(&tolerances, 2), [true, false], "a velocity error without a time counts at once");
-        assert_eq!(look(&tolerances, UNIT), [true, false]);
+        assert_eq!(look(&tolerances, 1_000_000_000), [true, false]);
     }
 }
