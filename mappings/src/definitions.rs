@@ -44,6 +44,11 @@ pub(super) fn definitions(mapping: &Mapping, table: &AttributeTable) -> Vec<Attr
     class.chain(instance).collect()
 }
 
+/// Whether an attribute with this need, a letter for each device function, is required of a device that closes a loop.
+fn requires(need: &str) -> bool {
+    need.chars().zip("BEFPVT".chars()).any(|(need, function)| need == 'R' && "PVT".contains(function))
+}
+
 /// What the standard itself says of the range; the rest of it is the drive's.
 fn limits(row: &CipAttribute) -> Option<(f64, f64)> {
     let number = |limit: Option<i64>, none: f64| limit.map_or(none, cast::f64_from_i64);
@@ -67,6 +72,7 @@ fn definition(
     let mut definition = AttributeDefinition::new(scope, row.id, data_type, access, &row.name);
     definition.elements = row.length;
     definition.settable_in_running = row.running;
+    definition.is_optional = !requires(&row.need);
     definition.default = DefaultValue::Integer(row.default.unwrap_or(0));
     definition.range = limits(row);
     // What names only a part of the value says nothing about the rest.

@@ -85,6 +85,7 @@ mod mechanics;
 mod numbers;
 mod origin;
 mod overlay;
+mod places;
 mod resolver;
 mod rows;
 mod sercos;
@@ -142,6 +143,7 @@ pub use mechanics::{MechanicalFact, Mechanics};
 pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;
 pub use overlay::{DrivesHead, OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};
+pub use places::Places;
 pub use sercos::commissioning::{CommissioningPlan, Refused, Step};
 use sercos::compile::Compiler;
 pub use sercos::compile::{SercosAxis, SercosError};
@@ -373,7 +375,12 @@ impl Mapping {
             let most =
                 if least == unsupported { unsupported } else { exception::ExceptionAction::MAJOR_FAULT.0 };
             let range = (f64::from(least), f64::from(most));
-            ElementRule { default: DefaultValue::Integer(i64::from(default)), range }
+            // A controller whose profile lacks an exception says 255 for it, whatever the device has.
+            ElementRule {
+                default: DefaultValue::Integer(i64::from(default)),
+                range,
+                keeps: Some(unsupported),
+            }
         };
         (0..EXCEPTION_BITS).map(rule).collect()
     }

@@ -7,7 +7,9 @@ use profile_cip::wire::forward_open::{ConnectionFailure, ForwardOpen, ForwardOpe
 use profile_cip::wire::message_router::{Reply, Request};
 use profile_cip::wire::motion::codes::{ConnectionFormat, MotionService};
 use profile_cip::wire::motion::fixed::{FixedActual, FixedCommand};
-use profile_cip::wire::motion::{ActualFrame, CommandFrame, ServiceRequest, ServiceResponse};
+use profile_cip::wire::motion::{
+    ActualFrame, CommandFrame, FORMAT_REVISION_RUN_IDLE, ServiceRequest, ServiceResponse, run_idle,
+};
 use profile_cip::wire::multiple_service::MultipleService;
 use profile_cip::wire::status::{ConnectionStatus, GeneralStatus, Service};
 use profile_cip::wire::unconnected_send::UnconnectedSend;
@@ -244,9 +246,22 @@ fn motion_update(data: &[u8]) -> Result<String, Error> {
         ConnectionFormat::FIXED_COMMAND => Ok(FixedCommand::parse(data)?.to_string()),
         ConnectionFormat::FIXED_ACTUAL => Ok(FixedActual::parse(data)?.to_string()),
         ConnectionFormat::VARIABLE_ACTUAL => Ok(ActualFrame::parse(data)?.to_string()),
+        _ if run_idle::revision_of(data) == FORMAT_REVISION_RUN_IDLE => behind_run_idle(data),
         // Of the formats that do not exist the error of this one tells the number.
         _ => Ok(CommandFrame::parse(data)?.to_string()),
     }
+}
+
+/// The tree of an update behind a run/idle header.
+fn behind_run_idle(data: &[u8]) -> Result<String, Error> {
+    let (run, update) = run_idle::split(FORMAT_REVISION_RUN_IDLE, data)?;
+    let tree = match ConnectionFormat(update.first().copied().unwrap_or(0)) {
+        ConnectionFormat::VARIABLE_ACTUAL => {
+            ActualFrame::parse_as(update, FORMAT_REVISION_RUN_IDLE)?.to_string()
+        }
+        _ => CommandFrame::parse_as(update, FORMAT_REVISION_RUN_IDLE)?.to_string(),
+    };
+    Ok(format!("Run/idle header: {}\n{tree}", if run { "run" } else { "idle" }))
 }
 
 fn forward_open(open: &ForwardOpen<'_>, level: usize, text: &mut Text) {

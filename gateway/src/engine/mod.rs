@@ -39,7 +39,7 @@ mod schedule;
 
 use std::cell::RefCell;
 
-use profile_cip::device::motion_device::SyncState;
+use profile_cip::device::motion_device::{SyncQuality, SyncState};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::{TimeBase, TimeSample};
 
@@ -206,6 +206,17 @@ impl Engine {
     pub fn set_sync(&mut self, sync: SyncState) {
         let sync = self.clock.set_sync(sync);
         self.devices.iter_mut().for_each(|channel| channel.device_mut().set_sync(sync));
+    }
+
+    /// How good the synchronization of system time is.
+    pub fn set_sync_quality(&mut self, quality: SyncQuality) {
+        self.devices.iter_mut().for_each(|channel| channel.device_mut().set_sync_quality(quality));
+    }
+
+    /// Least Sync Threshold of the controllers that are connected (class attribute 29), ns.
+    #[must_use]
+    pub fn sync_threshold(&self) -> Option<u64> {
+        self.devices.iter().filter_map(|channel| channel.device().sync_threshold()).min()
     }
 
     /// Takes a sample of system time, before each [`Self::cycle`]. A step is reported to the devices, which compensate the stamps of

@@ -1,9 +1,14 @@
 //! What the cycle thread is told of system time: a few words, written by the thread of the source.
 
-use profile_cip::device::motion_device::SyncState;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use profile_cip::device::motion_device::{SyncQuality, SyncState};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeSample;
 
+use super::ptp::LOG_SYNC;
+use super::ptp::wire::Control;
 use super::status::TimeStatus;
 use crate::engine::Engine;
 use crate::latest::{Reader, Words};
@@ -14,6 +19,8 @@ use crate::sys::clock::{HostTime, monotonic_now};
 pub struct CycleTime {
     /// Whether time is synchronized, and with whom. The offset is that of the time base.
     pub sync: SyncState,
+    /// How well it is measured.
+    pub quality: SyncQuality,
     /// System time with the monotonic time of one instant, and its rate.
     pub sample: Option<TimeSample>,
 }
@@ -27,7 +34,17 @@ impl CycleTime {
             synchronized: status.phase.is_synchronized(),
             offset: 0,
         };
-        Self { sync, sample: status.sample }
+        let master = status.master;
+        let quality = SyncQuality {
+            // Before the first offset there is nothing that could vary.
+            variance: match status.offset_from_master {
+                Some(_) => u32::try_from(status.spread).unwrap_or(u32::MAX),
+                None => u32::MAX,
+            },
+            steps_removed: master.map_or(0, |master| master.steps_removed),
+            log_sync_interval: LOG_SYNC,
+        };
+        Self { sync, quality, sample: status.sample }
     }
 }
 
@@ -37,8 +54,8 @@ const SYNCHRONIZED: u64 = 2;
 const HAS_SAMPLE: u64 = 4;
 
 impl Words for CycleTime {
-    type Array = [u64; 5];
-    const EMPTY: Self::Array = [0; 5];
+    type Array = [u64; 6];
+    const EMPTY: Self::Array = [0; 6];
 
     fn to_words(&self, words: &mut Self::Array) -> usize {
         let bit = |is_set: bool, bit: u64| if is_set { bit } else { 0 };
@@ -49,18 +66,29 @@ impl Words for CycleTime {
         let [at, system, rate] = self
             .sample
             .map_or([0; 3], |sample| [sample.at.0, sample.system.0, sample.rate_ppb.cast_unsigned()]);
-        *words = [flags, grandmaster, at, system, rate];
+        let SyncQuality { variance, steps_removed, log_sync_interval } = self.quality;
+        let [steps_low, steps_high] = steps_removed.to_le_bytes();
+        let [a, b, c, d] = variance.to_le_bytes();
+        let [interval] = log_sync_interval.to_le_bytes();
+        let quality = u64::from_le_bytes([a, b, c, d, steps_low, steps_high, interval, 0]);
+        *words = [flags, grandmaster, at, system, rate, quality];
         words.len()
     }
 
     fn from_words(words: &Self::Array) -> Self {
-        let [flags, grandmaster, at, system, rate] = *words;
+        let [flags, grandmaster, at, system, rate, quality] = *words;
+        let [a, b, c, d, steps_low, steps_high, interval, _] = quality.to_le_bytes();
         let is_set = |bit: u64| flags & bit != 0;
         Self {
             sync: SyncState {
                 grandmaster: is_set(HAS_GRANDMASTER).then(|| grandmaster.to_be_bytes()),
                 synchronized: is_set(SYNCHRONIZED),
                 offset: 0,
+            },
+            quality: SyncQuality {
+                variance: u32::from_le_bytes([a, b, c, d]),
+                steps_removed: u16::from_le_bytes([steps_low, steps_high]),
+                log_sync_interval: i8::from_le_bytes([interval]),
             },
             sample: is_set(HAS_SAMPLE).then_some(TimeSample {
                 at: MonotonicTime(at),
@@ -77,14 +105,24 @@ pub struct TimeFeed {
     reader: Reader<CycleTime>,
     /// System time is the host's clock; otherwise what is told.
     is_host: bool,
-    last: Option<SyncState>,
+    last: Option<(SyncState, SyncQuality)>,
+    /// What the source is told.
+    control: Arc<Control>,
+    /// Threshold of the configuration, ns.
+    threshold: u64,
 }
 
 impl TimeFeed {
-    /// A feed from what is told; with `is_host` the time is that of the host's clock.
+    /// A feed from what is told; with `is_host` the time is that of the host's clock. `threshold` is that of a clock that no
+    /// controller has said another one to, ns.
     #[must_use]
-    pub const fn new(reader: Reader<CycleTime>, is_host: bool) -> Self {
-        Self { reader, is_host, last: None }
+    pub const fn new(
+        reader: Reader<CycleTime>,
+        is_host: bool,
+        control: Arc<Control>,
+        threshold: u64,
+    ) -> Self {
+        Self { reader, is_host, last: None, control, threshold }
     }
 
     /// Feeds before the first cycle.
@@ -98,10 +136,13 @@ impl TimeFeed {
     /// Feeds after a cycle: a sample that is a cycle old is as good.
     pub fn feed(&mut self, engine: &mut Engine) {
         let latest = self.reader.read();
-        if self.last != Some(latest.sync) {
-            self.last = Some(latest.sync);
+        if self.last != Some((latest.sync, latest.quality)) {
+            self.last = Some((latest.sync, latest.quality));
             engine.set_sync(latest.sync);
+            engine.set_sync_quality(latest.quality);
         }
+        let threshold = engine.sync_threshold().unwrap_or(self.threshold);
+        self.control.threshold.store(threshold, Ordering::Relaxed);
         let sample = if self.is_host {
             HostTime.sample()
         } else {
@@ -129,12 +170,13 @@ mod tests {
     #[test]
     fn what_is_told_arrives() {
         let sync = SyncState { grandmaster: Some([1, 2, 3, 4, 5, 6, 7, 8]), synchronized: true, offset: 0 };
+        let quality = SyncQuality { variance: 0x0102_0304, steps_removed: 0x0506, log_sync_interval: -3 };
         let sample = TimeSample { at: MonotonicTime(7), system: SystemTime(u64::MAX), rate_ppb: -40_000 };
         for told in [
             CycleTime::default(),
-            CycleTime { sync, sample: Some(sample) },
-            CycleTime { sync: SyncState { synchronized: false, ..sync }, sample: None },
-            CycleTime { sync: SyncState { grandmaster: None, ..sync }, sample: Some(sample) },
+            CycleTime { sync, quality, sample: Some(sample) },
+            CycleTime { sync: SyncState { synchronized: false, ..sync }, quality, sample: None },
+            CycleTime { sync: SyncState { grandmaster: None, ..sync }, quality, sample: Some(sample) },
         ] {
             let mut words = CycleTime::EMPTY;
             assert_eq!(told.to_words(&mut words), words.len());

@@ -159,6 +159,11 @@ impl Judge {
         }
     }
 
+    /// Offsets are judged by another threshold from the next one on, ns.
+    pub const fn set_threshold(&mut self, threshold: u64) {
+        self.threshold = threshold;
+    }
+
     /// How it stands.
     #[must_use]
     pub const fn phase(&self) -> SyncPhase {

@@ -147,6 +147,7 @@ impl TimeService {
         let view = TimeView::of(first);
         let control = Arc::new(Control::default());
         control.domain.store(config.domain, Ordering::Relaxed);
+        control.threshold.store(follower.threshold, Ordering::Relaxed);
         let reporter = Reporter { publisher, view: view.clone(), said: None };
         let thread = match config.source {
             TimeSource::Ptp => {
@@ -172,7 +173,8 @@ impl TimeService {
             }
             TimeSource::Shared | TimeSource::None => None,
         };
-        Ok((Self { view, control, thread }, TimeFeed::new(reader, is_host)))
+        let feed = TimeFeed::new(reader, is_host, Arc::clone(&control), follower.threshold);
+        Ok((Self { view, control, thread }, feed))
     }
 
     /// The state of system time.
@@ -330,6 +332,7 @@ fn phc(config: &Time, interface: Option<&String>) -> Result<Option<Phc>, SourceE
 /// Tells what `ptp4l` says.
 fn watch_daemon(mut daemon: Daemon, control: &Control, mut reporter: Reporter) {
     while !control.stop.load(Ordering::Relaxed) {
+        daemon.set_threshold(control.threshold.load(Ordering::Relaxed));
         reporter.report(daemon.look(monotonic_now()));
         std::thread::sleep(LOOK);
     }

@@ -6,7 +6,7 @@ use profile_cip::wire::status::GeneralStatus;
 use profile_generic::fault_set::{ActiveFault, Origin};
 
 use super::fact::{Carrier, Direction, Fact, Raw, What};
-use super::tree::hex;
+use super::tree::{hex, text};
 use super::{Node, TranslateError, Translator, quantity};
 use crate::mapping::{Access, Backing, CipFault, Item, ValueError};
 
@@ -16,20 +16,20 @@ impl Translator {
         let stage = Arc::clone(&self.stage);
         let (axis, mapping) = (&stage.axes[number], &stage.mapping);
         let Some(known) = mapping.dictionaries.cip.attribute_by_id(id) else {
-            return Err(TranslateError::Value(format!(
+            return Err(TranslateError::Value(text!(
                 "attribute {id}: the axis object has no such attribute"
             )));
         };
         let mut node =
-            Node::new(format!("axis {}: set attribute {id} {} to {}", axis.name, known.name, hex(bytes)));
+            Node::new(text!("axis {}: set attribute {id} {} to {}", axis.name, known.name, hex(bytes)));
         if let Some((_, reason)) = mapping.cip.rejected.iter().find(|(rejected, _)| *rejected == id) {
-            node.push(Node::new(format!("not supported: {reason}")));
+            node.push(Node::new(text!("not supported: {reason}")));
         }
         let Some(entry) = axis.attributes.get(id) else {
             let (reply, _) = self.bench()?.set(number, id, bytes);
             node.push(Node::new("no row"));
             let status = reply.map(|reply| GeneralStatus(reply.general_status).to_string());
-            node.push(Node::new(format!("answer: {}", status.as_deref().unwrap_or("none"))));
+            node.push(Node::new(text!("answer: {}", status.as_deref().unwrap_or("none"))));
             return Ok(node);
         };
         let row = mapping.attribute_row(id);
@@ -37,12 +37,12 @@ impl Translator {
             Backing::Device => ("served by the device".to_owned(), None),
             Backing::Connection => ("written by the connection".to_owned(), None),
             Backing::Stored => ("stored and given back, without effect".to_owned(), None),
-            Backing::Constant(value) => (format!("always {value}"), None),
+            Backing::Constant(value) => (text!("always {value}"), None),
             Backing::Mechanics(_) => ("compared with the scaling of the drive".to_owned(), None),
             Backing::Signal { signal, .. } if entry.access == Access::SetCyclic => {
-                (format!("shows {signal}, set by cyclic write data only"), None)
+                (text!("shows {signal}, set by cyclic write data only"), None)
             }
-            Backing::Signal { signal, .. } => (format!("shows {signal}, cannot be set"), None),
+            Backing::Signal { signal, .. } => (text!("shows {signal}, cannot be set"), None),
             Backing::Parameter { parameter, .. } => {
                 let value = match entry.to_generic(bytes) {
                     Ok(value) => mapping
@@ -51,7 +51,7 @@ impl Translator {
                         .by_number(parameter)
                         .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value)),
                     Err(error @ (ValueError::Length { .. } | ValueError::NotConvertible)) => {
-                        return Err(TranslateError::Value(format!("attribute {id} {}: {error}", known.name)));
+                        return Err(TranslateError::Value(text!("attribute {id} {}: {error}", known.name)));
                     }
                     Err(error) => error.to_string(),
                 };
@@ -63,7 +63,7 @@ impl Translator {
                     Some(_) => "",
                 };
                 let name = &mapping.parameter_name(parameter);
-                (format!("{name} {value}{lacks}"), place)
+                (text!("{name} {value}{lacks}"), place)
             }
         };
         node.push(Node::new(what).by(row));
@@ -72,11 +72,11 @@ impl Translator {
             let width = place.map_or(bytes.len(), |place| place.width.bytes());
             let row = place.and_then(|place| axis.parameter_row(mapping, place.parameter));
             let bytes = bytes.get(..width).unwrap_or(&bytes);
-            let text = format!("{}: write {} ({} bytes)", self.named(item), hex(bytes), bytes.len());
+            let text = text!("{}: write {} ({} bytes)", self.named(item), hex(bytes), bytes.len());
             node.push(Node::new(text).by(row));
         }
         node.push(Node::new(match reply {
-            Some(reply) => format!("answer: {}", GeneralStatus(reply.general_status)),
+            Some(reply) => text!("answer: {}", GeneralStatus(reply.general_status)),
             None => "no answer".to_owned(),
         }));
         Ok(node)
@@ -86,14 +86,14 @@ impl Translator {
     pub(super) fn held(&mut self, number: usize, item: Item, bytes: &[u8]) -> Result<Node, TranslateError> {
         let stage = Arc::clone(&self.stage);
         let (axis, mapping) = (&stage.axes[number], &stage.mapping);
-        let mut node = Node::new(format!("{}: {} is {}", axis.drive, self.named(item), hex(bytes)));
+        let mut node = Node::new(text!("{}: {} is {}", axis.drive, self.named(item), hex(bytes)));
         if axis.south.is_diagnostic(item) {
             self.causes(number, item, bytes, &mut node)?;
             return Ok(node);
         }
         for place in axis.south.parameters().iter().filter(|place| place.item == item) {
             let Some(value) = place.decode(bytes) else {
-                let text = format!(
+                let text = text!(
                     "{}: expected {} bytes, got {}",
                     self.named(item),
                     place.width.bytes(),
@@ -106,7 +106,7 @@ impl Translator {
                 .generic
                 .by_number(place.parameter)
                 .map_or_else(|| value.to_string(), |row| quantity(axis, row.quantity, value));
-            let mut read = Node::new(format!("{} {measured}", mapping.parameter_name(place.parameter)))
+            let mut read = Node::new(text!("{} {measured}", mapping.parameter_name(place.parameter)))
                 .by(axis.parameter_row(mapping, place.parameter));
             for entry in axis.attributes.entries() {
                 let Backing::Parameter { parameter, .. } = entry.backing else { continue };
@@ -118,14 +118,14 @@ impl Translator {
                 let answer = bench.get(number, entry.id);
                 bench.release();
                 let seen = match answer {
-                    Some(reply) if reply.general_status == 0 => format!("reads {}", hex(&reply.data)),
-                    Some(reply) => format!("answers {}", GeneralStatus(reply.general_status)),
+                    Some(reply) if reply.general_status == 0 => text!("reads {}", hex(&reply.data)),
+                    Some(reply) => text!("answers {}", GeneralStatus(reply.general_status)),
                     None => "is not answered".to_owned(),
                 };
                 let name =
                     mapping.dictionaries.cip.attribute_by_id(entry.id).map_or("", |row| row.name.as_str());
                 read.push(
-                    Node::new(format!("attribute {} {name} {seen}", entry.id))
+                    Node::new(text!("attribute {} {name} {seen}", entry.id))
                         .by(mapping.attribute_row(entry.id)),
                 );
             }
@@ -180,14 +180,14 @@ impl Translator {
                 what: What::Fault(cause),
                 raw: Some(Raw::new(bytes, Some(word.into()), Some(0), Carrier::Object)),
             };
-            let mut shown = Node::new(format!("{cause}, reaction {reaction}")).by(row).shows([fact]);
+            let mut shown = Node::new(text!("{cause}, reaction {reaction}")).by(row).shows([fact]);
             let seen = match axis.north.fault(cause) {
                 Some(CipFault::Axis { fault_type, alarm_type, code }) => {
                     let alarm =
-                        alarm_type.map_or_else(String::new, |kind| format!(", as an alarm of type {kind}"));
-                    format!("Axis Fault Type {fault_type}, code {code}{alarm}")
+                        alarm_type.map_or_else(String::new, |kind| text!(", as an alarm of type {kind}"));
+                    text!("Axis Fault Type {fault_type}, code {code}{alarm}")
                 }
-                Some(CipFault::Node(code)) => format!("Node Fault Code {code}"),
+                Some(CipFault::Node(code)) => text!("Node Fault Code {code}"),
                 None => "no CIP exception".to_owned(),
             };
             shown.push(Node::new(seen).by(mapping.exception_row(cause)));

@@ -8,7 +8,7 @@ use profile_cia402::wire::emcy::Emcy;
 use profile_generic::can::{Frame, Id};
 
 use super::stage::{CanDrive, CanPdo, StageAxis};
-use super::tree::hex;
+use super::tree::{hex, text};
 use super::{Node, TranslateError, Translator};
 use crate::mapping::Item;
 
@@ -29,11 +29,11 @@ impl Translator {
         }
         if let Some((number, _)) = found.iter().find(|(number, _)| self.unfit.contains(number)) {
             let drive = &stage.axes[*number].drive;
-            let text = format!("{drive}: not translated, the recording does not fit the configuration");
+            let text = text!("{drive}: not translated, the recording does not fit the configuration");
             return Some(Err(TranslateError::Value(text)));
         }
         if let [(_, first), ..] = found.as_slice() {
-            let mut node = Node::new(format!("{first}: {}", hex(frame.data())));
+            let mut node = Node::new(text!("{first}: {}", hex(frame.data())));
             for (number, pdo) in found {
                 let told = match pdo.direction {
                     Direction::Receive => self.rpdo(number, pdo, frame.data()),
@@ -60,7 +60,7 @@ impl Translator {
     /// What a drive is told, read back.
     fn rpdo(&self, number: usize, pdo: &CanPdo, data: &[u8]) -> Result<Node, TranslateError> {
         let axis = &self.stage.axes[number];
-        let mut node = Node::new(format!("axis {} on {}", axis.name, axis.drive)).about(number);
+        let mut node = Node::new(text!("axis {} on {}", axis.name, axis.drive)).about(number);
         let mut values = vec![0; usize::from(axis.south.telegram.command_bytes)];
         if !CanDrive::gather(pdo, data, &mut values) {
             return Err(short(pdo, data));
@@ -76,9 +76,9 @@ impl Translator {
                 _ => None,
             };
             let word = Node::new(match *bytes {
-                [low, high] => format!("{} {:#06x}", self.named(item), u16::from_le_bytes([low, high])),
-                [octet] => format!("{} {}", self.named(item), i8::from_le_bytes([octet])),
-                _ => format!("{} {}", self.named(item), hex(bytes)),
+                [low, high] => text!("{} {:#06x}", self.named(item), u16::from_le_bytes([low, high])),
+                [octet] => text!("{} {}", self.named(item), i8::from_le_bytes([octet])),
+                _ => text!("{} {}", self.named(item), hex(bytes)),
             });
             node.push(word.shows(fact));
         }
@@ -107,7 +107,7 @@ impl Translator {
             .map(|known| known.to_string())
             .collect();
         if !rest.is_empty() {
-            let text = format!("axis {} on {}: {} to come", axis.name, axis.drive, rest.join(", "));
+            let text = text!("axis {} on {}: {} to come", axis.name, axis.drive, rest.join(", "));
             return Ok(Node::new(text).about(number));
         }
         state.heard.clear();
@@ -124,13 +124,13 @@ impl Translator {
         let (_, _, drive) = of_node.first()?;
         let emcy = match Emcy::parse(data) {
             Ok(emcy) => emcy,
-            Err(error) => return Some(Err(TranslateError::Value(format!("EMCY of {drive}: {error}")))),
+            Err(error) => return Some(Err(TranslateError::Value(text!("EMCY of {drive}: {error}")))),
         };
-        let mut node = Node::new(format!("EMCY of {drive}: {emcy}"));
+        let mut node = Node::new(text!("EMCY of {drive}: {emcy}"));
         let words = |number: usize| self.stage.axes[number].south.diagnostic_words(true).collect();
         let words: Vec<Vec<Item>> = of_node.iter().map(|(number, ..)| words(*number)).collect();
         for ((number, name, _), words) in of_node.iter().zip(words) {
-            let mut axis = Node::new(format!("axis {name}")).about(*number);
+            let mut axis = Node::new(text!("axis {name}")).about(*number);
             for word in words {
                 // The box reads the code where the drive keeps it; the message alone stops no axis.
                 if let Err(error) = self.causes(*number, word, &emcy.code.0.to_le_bytes(), &mut axis) {
@@ -144,5 +144,5 @@ impl Translator {
 }
 
 fn short(pdo: &CanPdo, data: &[u8]) -> TranslateError {
-    TranslateError::Value(format!("{pdo}: expected {} bytes, got {}", pdo.len, data.len()))
+    TranslateError::Value(text!("{pdo}: expected {} bytes, got {}", pdo.len, data.len()))
 }

@@ -12,7 +12,7 @@ use super::bench::{Telegram, Told, Update};
 use super::fact::{Carrier, Direction, Fact, Raw, What, of_command};
 use super::stage::StageAxis;
 use super::telegram::{raw, sent};
-use super::tree::Mark;
+use super::tree::{Mark, text};
 use super::{Node, TranslateError, Translator, devicenet, shown};
 use crate::engine::bus::devicenet::end::Row;
 use crate::engine::notice::Notice;
@@ -36,7 +36,7 @@ impl Translator {
         for (instance, block, write) in blocks {
             match self.axis_of_instance(*instance) {
                 Some(number) => known.push((number, block, write)),
-                None => node.push(Node::new(format!("instance {instance}: no axis of the configuration"))),
+                None => node.push(Node::new(text!("instance {instance}: no axis of the configuration"))),
             }
         }
         let allowed = stage.mapping.cip.feedback_modes;
@@ -84,9 +84,8 @@ impl Translator {
     ) -> Result<Node, TranslateError> {
         let stage = std::sync::Arc::clone(&self.stage);
         let (axis, mapping) = (&stage.axes[number], &stage.mapping);
-        let mut node =
-            Node::new(format!("axis {} (instance {}) on {}", axis.name, axis.instance, axis.drive))
-                .about(number);
+        let mut node = Node::new(text!("axis {} (instance {}) on {}", axis.name, axis.instance, axis.drive))
+            .about(number);
         let asked = |what, raw| Fact {
             axis: number,
             direction: Direction::FromController,
@@ -100,13 +99,13 @@ impl Translator {
             Raw::new(&[control_mode.0], Some(control_mode.0.into()), Some(CONTROL_MODE_AT), Carrier::Block);
         let fact = asked(What::Mode(mode), Some(raw));
         let shown_mode = match mode {
-            Some(mode) => Node::new(format!("Control Mode {control_mode} -> mode {mode}"))
+            Some(mode) => Node::new(text!("Control Mode {control_mode} -> mode {mode}"))
                 .by(axis.control_mode_row(mapping, mode)),
-            None => Node::new(format!("Control Mode {control_mode}: no row")),
+            None => Node::new(text!("Control Mode {control_mode}: no row")),
         };
         node.push(shown_mode.shows([fact]));
         if let Some(mode) = replaced {
-            node.push(Node::new(format!(
+            node.push(Node::new(text!(
                 "Feedback Mode {}: the box refuses to enable an axis with it; translated as one with Motor Feedback",
                 mode.source()
             )));
@@ -121,14 +120,14 @@ impl Translator {
         for ((text, signal), (_, raw)) in elements(&block.values).into_iter().zip(of_command(block)) {
             let value = told.command.get(signal).filter(|_| follows);
             let element = match value {
-                Some(value) => Node::new(format!("{text} -> {signal} {}", shown(axis, signal, value)))
+                Some(value) => Node::new(text!("{text} -> {signal} {}", shown(axis, signal, value)))
                     .by(axis.cyclic_row(mapping, signal)),
-                None => Node::new(format!("{text}: not followed")),
+                None => Node::new(text!("{text}: not followed")),
             };
             node.push(element.shows([asked(What::Signal(signal, value), Some(raw))]));
         }
         if let Some(count) = block.values.unwind_count {
-            node.push(Node::new(format!("Unwind Cycle Count {count}")));
+            node.push(Node::new(text!("Unwind Cycle Count {count}")));
         }
         self.request(number, block, answer.as_ref(), &mut node);
         push_notices(&mut node, said, number, axis);
@@ -139,7 +138,7 @@ impl Translator {
         }
         node.push(match &told.last {
             Some(telegram) => self.telegram_of(number, telegram, true),
-            None => Node::new(format!("nothing is sent to {}", axis.drive)),
+            None => Node::new(text!("nothing is sent to {}", axis.drive)),
         });
         if !follows {
             node.push(Node::new("the drive does not follow: set-points are withheld"));
@@ -164,16 +163,16 @@ impl Translator {
         };
         let row = self.stage.mapping.request_row(code.0);
         let mut request = match axis.north.request(code.0) {
-            None => Node::new(format!("Axis Control {code}: no row")),
+            None => Node::new(text!("Axis Control {code}: no row")),
             Some(request) => match request.request {
-                Some(asked) => Node::new(format!("Axis Control {code} -> {asked}")).by(row),
-                None => Node::new(format!("Axis Control {code}: carried out by the device")).by(row),
+                Some(asked) => Node::new(text!("Axis Control {code} -> {asked}")).by(row),
+                None => Node::new(text!("Axis Control {code}: carried out by the device")).by(row),
             },
         };
         if let Some(answer) = answer {
             let text = match answer.axis_response {
                 AxisControl::NONE => "no response yet".to_owned(),
-                response => format!("Axis Response {response}, {}", GeneralStatus(answer.response_status)),
+                response => text!("Axis Response {response}, {}", GeneralStatus(answer.response_status)),
             };
             request.push(Node::new(text));
         }
@@ -192,16 +191,16 @@ impl Translator {
         if let Some(drive) = axis.devicenet() {
             let mut row: Row = [0; ROW_LEN];
             if let Err(error) = drive.end.clone().overhear(bytes, &mut row) {
-                node.push(Node::new(format!("not readable: {error}")));
+                node.push(Node::new(text!("not readable: {error}")));
                 return node;
             }
-            let text = format!("{}: action {action}, mode {}", devicenet::asked(axis, &row), command.mode);
+            let text = text!("{}: action {action}, mode {}", devicenet::asked(axis, &row), command.mode);
             let facts = [What::Action(*action), What::Mode(Some(command.mode))].map(|what| made(what, None));
             node.push(Node::new(text).by(devicenet::rows_of(axis, mapping, &row)).shows(facts));
             for field in devicenet::values_to(axis, &row).filter(|_| values) {
                 let (name, raw) = (drive.value(field).0, devicenet::raw(drive, field, &row));
                 let fact = Raw::of_field(axis, field, &row);
-                node.push(self.made_of(number, &format!("{name}: {raw}"), field.signal, command, fact));
+                node.push(self.made_of(number, &text!("{name}: {raw}"), field.signal, command, fact));
             }
             return node;
         }
@@ -214,7 +213,7 @@ impl Translator {
             let at = axis.south.place_of_command(item).map_or(0, |(at, _)| at);
             let raw = Raw::of_word(axis, true, at, bytes);
             let word = word.first_chunk().map_or(0, |word| u16::from_le_bytes(*word));
-            let text = format!("{} {word:#06x}: action {action}, mode {}", self.named(item), command.mode);
+            let text = text!("{} {word:#06x}: action {action}, mode {}", self.named(item), command.mode);
             node.push(
                 Node::new(text)
                     .by(axis.action_row(mapping, *action, status))
@@ -224,11 +223,11 @@ impl Translator {
         }
         if let Some((item, &[octet])) = heads.next().and_then(|item| Some((item, word_of(item)?))) {
             let octet = i8::from_le_bytes([octet]);
-            let text = format!("{} {octet}: mode {}", self.named(item), command.mode);
+            let text = text!("{} {octet}: mode {}", self.named(item), command.mode);
             node.push(Node::new(text).by(axis.mode_row(mapping, selection)));
         }
         for (field, item) in axis.south.command_fields().filter(|_| values) {
-            let text = format!("{}: {}", self.named(item), raw(axis, field, bytes));
+            let text = text!("{}: {}", self.named(item), raw(axis, field, bytes));
             let fact = Raw::of_field(axis, field, bytes);
             node.push(self.made_of(number, &text, field.signal, command, fact));
         }
@@ -239,7 +238,7 @@ impl Translator {
     fn made_of(&self, number: usize, text: &str, signal: Signal, command: &AxisCommand, raw: Raw) -> Node {
         let axis = &self.stage.axes[number];
         let value = command.get(signal).unwrap_or_default();
-        Node::new(format!("{text} <- {signal} {}", shown(axis, signal, value)))
+        Node::new(text!("{text} <- {signal} {}", shown(axis, signal, value)))
             .by(axis.signal_row(&self.stage.mapping, signal))
             .shows([Fact {
                 axis: number,
@@ -276,9 +275,9 @@ pub(super) fn push_notices(node: &mut Node, said: &[Notice], number: usize, axis
             _ => (text.as_str(), ""),
         };
         let line = Node::new(match (notice, rest) {
-            (Notice::Fault { .. }, "") => format!("log: {text})"),
-            (Notice::Fault { .. }, why) => format!("log: {text}): {why}"),
-            _ => format!("log: {text}"),
+            (Notice::Fault { .. }, "") => text!("log: {text})"),
+            (Notice::Fault { .. }, why) => text!("log: {text}): {why}"),
+            _ => text!("log: {text}"),
         });
         let fault = match notice {
             Notice::Fault { fault, .. } => Some(Fact {
@@ -299,10 +298,10 @@ fn elements(values: &CommandValues) -> Vec<(String, Signal)> {
     let mut elements = Vec::new();
     match values.position {
         Some(CommandPosition::Float(value)) => {
-            elements.push((format!("Command Position {value} (LREAL)"), Signal::PositionCommand));
+            elements.push((text!("Command Position {value} (LREAL)"), Signal::PositionCommand));
         }
         Some(CommandPosition::Integer(value)) => {
-            elements.push((format!("Command Position {value} (DINT)"), Signal::PositionCommand));
+            elements.push((text!("Command Position {value} (DINT)"), Signal::PositionCommand));
         }
         None => {}
     }
@@ -312,7 +311,7 @@ fn elements(values: &CommandValues) -> Vec<(String, Signal)> {
         ("Command Torque", values.torque, Signal::TorqueCommand),
     ];
     for (name, value, signal) in reals {
-        elements.extend(value.map(|value| (format!("{name} {value}"), signal)));
+        elements.extend(value.map(|value| (text!("{name} {value}"), signal)));
     }
     elements
 }

@@ -4,7 +4,7 @@ use profile_cip::wire::class1::{Class1Datagram, SEQUENCE_COUNT_LEN};
 use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::motion::codes::ConnectionFormat;
 use profile_cip::wire::motion::fixed::{FixedActual, FixedCommand};
-use profile_cip::wire::motion::{ActualFrame, CommandFrame};
+use profile_cip::wire::motion::{ActualFrame, CommandFrame, FORMAT_REVISION_RUN_IDLE, run_idle};
 
 use crate::decode::packet::{self, Packet};
 
@@ -54,7 +54,7 @@ pub fn recognise(bytes: &[u8]) -> Result<Recognised<'_>, FrameError> {
         Packet::Udp { from, to, payload } if from.port() == IO_PORT || to.port() == IO_PORT => {
             let datagram =
                 Class1Datagram::parse(payload).map_err(|error| FrameError::Other(error.to_string()))?;
-            return update(datagram.data).map_err(|error| FrameError::Other(error.to_string()));
+            return connected(datagram.data);
         }
         Packet::Udp { from, to, .. } => {
             return Err(FrameError::Other(format!("UDP {from} -> {to} is no class 1 connection")));
@@ -68,7 +68,7 @@ pub fn recognise(bytes: &[u8]) -> Result<Recognised<'_>, FrameError> {
         Packet::Other(_) => {}
     }
     if let Ok(datagram) = Class1Datagram::parse(bytes) {
-        return update(datagram.data).map_err(|error| FrameError::Other(error.to_string()));
+        return connected(datagram.data);
     }
     let error = match update(bytes) {
         Ok(recognised) => return Ok(recognised),
@@ -79,6 +79,16 @@ pub fn recognise(bytes: &[u8]) -> Result<Recognised<'_>, FrameError> {
         Some(Ok(recognised)) => Ok(recognised),
         _ => Err(FrameError::Unknown { len: bytes.len(), error: error.to_string() }),
     }
+}
+
+/// The data of a datagram.
+fn connected(data: &[u8]) -> Result<Recognised<'_>, FrameError> {
+    if run_idle::revision_of(data) == FORMAT_REVISION_RUN_IDLE {
+        let text =
+            "an update of format revision 3, behind a run/idle header, is not translated; `decode` shows it";
+        return Err(FrameError::Other(text.to_owned()));
+    }
+    update(data).map_err(|error| FrameError::Other(error.to_string()))
 }
 
 /// An update behind its sequence count.

@@ -12,7 +12,7 @@ use super::commanded::push_notices;
 use super::fact::{Carrier, Direction as Way, Fact, Raw, What, of_actual};
 use super::stage::Behind;
 use super::telegram::{frames, raw};
-use super::tree::{Mark, Row, hex};
+use super::tree::{Mark, Row, hex, text};
 use super::{Node, TranslateError, Translator, devicenet, flags, shown};
 use crate::engine::notice::Notice;
 
@@ -69,7 +69,7 @@ impl Translator {
 
     fn at(&self, number: usize, bytes: &[u8]) -> String {
         let drive = &self.stage.axes[number].drive;
-        format!("AT of {drive}, connection 1, {} bytes: {}", bytes.len(), hex(bytes))
+        text!("AT of {drive}, connection 1, {} bytes: {}", bytes.len(), hex(bytes))
     }
 
     /// The drive says this from now on.
@@ -94,7 +94,7 @@ impl Translator {
         let (axis, mapping) = (&stage.axes[number], &stage.mapping);
         let needed = usize::from(axis.south.telegram.feedback_bytes);
         let Some(word) = axis.south.status(row) else {
-            node.push(Node::new(format!("expected {needed} bytes")).marked(Mark::Error));
+            node.push(Node::new(text!("expected {needed} bytes")).marked(Mark::Error));
             return Ok(node);
         };
         let mode = axis.south.mode(word);
@@ -108,40 +108,40 @@ impl Translator {
         let mode_row = || mode.and_then(|mode| axis.mode_row(mapping, mode));
         let mut heads = axis.south.telegram.feedback.iter();
         if let Some(item) = heads.next() {
-            let text = format!("{} {:#06x}: {told}, mode {shown_mode}", self.named(*item), word & 0xFFFF);
+            let text = text!("{} {:#06x}: {told}, mode {shown_mode}", self.named(*item), word & 0xFFFF);
             let raw = Raw::of_word(axis, false, 0, row);
             let facts = [heard(What::Report(told), raw), heard(What::Mode(generic_mode), raw)];
             let mut status = Node::new(text).by(axis.report_row(mapping, word)).by(mode_row()).shows(facts);
             let words = axis.south.status_words(row);
             for (idn, word) in &words {
-                status.push(Node::new(format!("{} {word:#06x}", self.named(*idn))));
+                status.push(Node::new(text!("{} {word:#06x}", self.named(*idn))));
             }
             if !feedback.status.is_empty() {
                 let rows = axis.status_rows(mapping, word, &words);
                 let fact = heard(What::Status(feedback.status), None);
-                let text = format!("status: {}", flags(feedback.status.iter_names()));
+                let text = text!("status: {}", flags(feedback.status.iter_names()));
                 status.push(Node::new(text).by(rows).shows([fact]));
             }
             node.push(status);
             if let Some((item, octet)) = heads.next().zip(axis.south.mode_octet(word)) {
                 node.push(
-                    Node::new(format!("{} {octet}: mode {shown_mode}", self.named(*item))).by(mode_row()),
+                    Node::new(text!("{} {octet}: mode {shown_mode}", self.named(*item))).by(mode_row()),
                 );
             }
         }
         if let Some(drive) = axis.devicenet() {
-            let text = format!("{}: {told}, mode {shown_mode}", devicenet::told(axis, row));
+            let text = text!("{}: {told}, mode {shown_mode}", devicenet::told(axis, row));
             let facts = [heard(What::Report(told), None), heard(What::Mode(generic_mode), None)];
             let mut status = Node::new(text).by(axis.report_row(mapping, word)).by(mode_row()).shows(facts);
             if !feedback.status.is_empty() {
-                status.push(Node::new(format!("status: {}", flags(feedback.status.iter_names()))));
+                status.push(Node::new(text!("status: {}", flags(feedback.status.iter_names()))));
             }
             node.push(status);
             for field in axis.south.feedback.fields() {
                 let Some(value) = feedback.get(field.signal) else { continue };
                 let (name, raw) = (drive.value(field).0, devicenet::raw(drive, field, row));
                 let generic = shown(axis, field.signal, value);
-                let text = format!("{name}: {raw} -> {} {generic}", field.signal);
+                let text = text!("{name}: {raw} -> {} {generic}", field.signal);
                 let fact =
                     heard(What::Signal(field.signal, Some(value)), Some(Raw::of_field(axis, field, row)));
                 node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)).shows([fact]));
@@ -149,7 +149,7 @@ impl Translator {
         }
         for (field, item) in axis.south.feedback_fields() {
             let Some(value) = feedback.get(field.signal) else { continue };
-            let text = format!(
+            let text = text!(
                 "{}: {} -> {} {}",
                 self.named(item),
                 raw(axis, field, row),
@@ -160,7 +160,7 @@ impl Translator {
             node.push(Node::new(text).by(axis.signal_row(mapping, field.signal)).shows([fact]));
         }
         if row.len() < needed {
-            node.push(Node::new(format!(
+            node.push(Node::new(text!(
                 "expected {needed} bytes, got {}: the rest is that of the simulated drive",
                 row.len()
             )));
@@ -183,7 +183,7 @@ impl Translator {
         // There is room for all that a block may have.
         let _ = block.emit(&mut writer);
         let len = writer.written();
-        let mut node = Node::new(format!(
+        let mut node = Node::new(text!(
             "D-to-C cyclic block of instance {}, {len} bytes: {}",
             axis.instance,
             hex(&bytes[..len])
@@ -198,7 +198,7 @@ impl Translator {
             Carrier::Block,
         );
         node.push(
-            Node::new(format!("Axis State {} from drive state {state}", block.axis_state))
+            Node::new(text!("Axis State {} from drive state {state}", block.axis_state))
                 .by(axis.state_row(mapping, state))
                 .shows([
                     report(What::State(state), None),
@@ -245,14 +245,14 @@ fn push_values(node: &mut Node, block: &ActualBlock, of: impl Fn(Signal) -> (Opt
     for (element, value, signal) in values {
         let Some(value) = value else { continue };
         let (row, fact) = of(signal);
-        node.push(Node::new(format!("{element} {value}")).by(row).shows(fact));
+        node.push(Node::new(text!("{element} {value}")).by(row).shows(fact));
     }
     if let Some((status, _)) = block.status.axis_status {
-        let text = format!("Axis Status {:#010x}: {}", status.bits(), flags(status.iter_names()));
+        let text = text!("Axis Status {:#010x}: {}", status.bits(), flags(status.iter_names()));
         node.push(Node::new(text));
     }
     if let Some((status, _)) = block.status.io_status {
-        let text = format!("Axis I/O Status {:#010x}: {}", status.bits(), flags(status.iter_names()));
+        let text = text!("Axis I/O Status {:#010x}: {}", status.bits(), flags(status.iter_names()));
         node.push(Node::new(text));
     }
 }

@@ -8,7 +8,7 @@ use profile_generic::program::{Field, Width};
 
 use super::fact::{Direction as Way, Fact, Raw, What};
 use super::stage::{Behind, CanDrive, StageAxis};
-use super::tree::hex;
+use super::tree::{hex, text};
 use super::{Node, Translator, devicenet, shown};
 use crate::mapping::Item;
 
@@ -23,7 +23,7 @@ impl Translator {
         if let (Some(item), Some(word)) = (axis.south.telegram.command.first(), bytes.first_chunk()) {
             let word = u16::from_le_bytes(*word);
             let fact = self.sent_word(number, word, 0, bytes);
-            node.push(Node::new(format!("{} {word:#06x}", self.named(*item))).shows([fact]));
+            node.push(Node::new(text!("{} {word:#06x}", self.named(*item))).shows([fact]));
         }
         for (field, item) in axis.south.command_fields() {
             node.push(self.command_value(number, field, item, bytes));
@@ -36,7 +36,7 @@ impl Translator {
         let axis = &self.stage.axes[number];
         let value =
             generic_of(field, bytes).map_or_else(String::new, |value| shown(axis, field.signal, value));
-        let text = format!("{}: {} = {} {value}", self.named(item), raw(axis, field, bytes), field.signal);
+        let text = text!("{}: {} = {} {value}", self.named(item), raw(axis, field, bytes), field.signal);
         self.sent_value(number, text, field, bytes)
     }
 
@@ -65,7 +65,7 @@ impl Translator {
 pub(super) fn sent(axis: &StageAxis, bytes: &[u8]) -> String {
     match &axis.behind {
         Behind::Sercos(_) => {
-            format!("MDT of {}, connection 0, {} bytes: {}", axis.drive, bytes.len(), hex(bytes))
+            text!("MDT of {}, connection 0, {} bytes: {}", axis.drive, bytes.len(), hex(bytes))
         }
         Behind::Can(drive) => frames(&axis.drive, drive, Direction::Receive, bytes),
         Behind::Devicenet(_) => devicenet::poll_of(axis, bytes),
@@ -75,8 +75,8 @@ pub(super) fn sent(axis: &StageAxis, bytes: &[u8]) -> String {
 /// The PDOs of a drive with the values of its program.
 pub(super) fn frames(name: &str, drive: &CanDrive, direction: Direction, bytes: &[u8]) -> String {
     let pdos = drive.pdos.iter().filter(|pdo| pdo.direction == direction);
-    let text = pdos.map(|pdo| format!("{pdo} {}", hex(&CanDrive::spread(pdo, bytes))));
-    format!("PDOs of {name}: {}", text.collect::<Vec<_>>().join(", "))
+    let text = pdos.map(|pdo| text!("{pdo} {}", hex(&CanDrive::spread(pdo, bytes))));
+    text!("PDOs of {name}: {}", text.collect::<Vec<_>>().join(", "))
 }
 
 /// The bytes of a field, the number in them, and where they stand in which frame.

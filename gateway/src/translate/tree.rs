@@ -1,6 +1,6 @@
 //! What a translation found, as a tree of lines that name the rows of the tables they come from.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -158,6 +158,23 @@ impl Node {
         self.children.iter().try_for_each(|child| child.write(out, level + 1, names))
     }
 }
+
+/// A line of text, in room for most of them: a string that grows is copied several times.
+pub(super) fn line(arguments: std::fmt::Arguments<'_>) -> String {
+    const ROOM: usize = 120;
+    let mut text = String::with_capacity(ROOM);
+    // Writing to a string does not fail.
+    let _ = text.write_fmt(arguments);
+    text
+}
+
+/// `format!` in room for a whole line: see [`line`].
+macro_rules! text {
+    ($($part:tt)*) => {
+        $crate::translate::tree::line(format_args!($($part)*))
+    };
+}
+pub(super) use text;
 
 /// Bytes as people write them: `01 a0`.
 pub(super) fn hex(bytes: &[u8]) -> String {

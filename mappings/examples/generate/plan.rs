@@ -49,6 +49,8 @@ pub struct Attributes {
     pub axis: &'static str,
     /// Of an axis: those that a device has by its tables.
     pub others: &'static str,
+    /// The same of the class.
+    pub other_class: &'static str,
     /// Constants that are not just the words of the name.
     pub constants: &'static [(&'static str, &'static str)],
 }
@@ -976,8 +978,11 @@ pub const FILES: &[File] = &[
             class: "1 14 15 16 17 18 19 20 21 22 31 32 33 34 35",
             axis: "40 42 60 61 89 90 91 92 93 94 650 651 652 653 654 655 656 657 658 659 660 661 662 663 664 665 \
                    666 667 668 669 670 674 675 676 677",
+            other_class: "2 3 4 5 6 7 28 29 30",
             others: "62 66 70 71 72 95 96 97 360 361 362 363 364 672 673 756 757 760 761 762 763 764",
             constants: &[
+                ("Maximum ID Number Class Attributes", "MAX_CLASS_ATTRIBUTE"),
+                ("Maximum ID Number Instance Attributes", "MAX_INSTANCE_ATTRIBUTE"),
                 ("Controller Update Delay High Limit", "UPDATE_DELAY_HIGH_LIMIT"),
                 ("Controller Update Delay Low Limit", "UPDATE_DELAY_LOW_LIMIT"),
                 ("Lost Controller Updates", "LOST_UPDATES"),

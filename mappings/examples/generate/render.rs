@@ -246,9 +246,11 @@ fn attributes(text: &mut String, list: &Attributes, dictionary: &CipDictionary) 
         }
     }
     text.push_str("    }\n    else {\n");
-    for number in list.others.split_whitespace() {
-        let (_, constant, name) = row("Instance", number);
-        let _ = writeln!(text, "{constant}, {name};");
+    for (scope, others) in [("Class", list.other_class), ("Instance", list.others)] {
+        for number in others.split_whitespace() {
+            let (_, constant, name) = row(scope, number);
+            let _ = writeln!(text, "{constant}, {name};");
+        }
     }
     text.push_str("    }\n}\n");
 }

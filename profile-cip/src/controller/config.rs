@@ -10,7 +10,7 @@ use super::sets::{DataSets, cyclic_len};
 use crate::wire::class1::SEQUENCE_COUNT_LEN;
 use crate::wire::motion::attribute_list::AttributeSelector;
 use crate::wire::motion::codes::{CommandTarget, ControlMode, FeedbackMode, FeedbackSource, TimeDataSet};
-use crate::wire::motion::{Format, fixed};
+use crate::wire::motion::{FORMAT_REVISION, Format, fixed};
 use profile_generic::time::DurationNs;
 
 /// Most axis instances of one connection; the EtherNet/IP part of the standard (IEC 61800-7-302) allows 16.
@@ -250,6 +250,9 @@ pub struct ControllerConfig {
     pub rpi_us: u32,
     /// Format of the motion connection. What the fixed one has not, no step may ask for.
     pub format: Format,
+    /// Connection point of the motion connection, which is its Format Revision: 2, or in the variable format 3, with a run/idle header
+    /// in front of each update.
+    pub format_revision: u8,
     /// Connection Timeout Multiplier code, 0..=7 for 4..512 intervals.
     pub timeout_multiplier: u8,
     /// Connection size of both directions in bytes with the 2-byte sequence count; above 511 the connection
@@ -302,6 +305,7 @@ impl ControllerConfig {
             power_structure: None,
             rpi_us: 2_000,
             format: Format::Variable,
+            format_revision: FORMAT_REVISION,
             timeout_multiplier: 1,
             connection_size,
             t_to_o_id: 0x4258_0001,

@@ -99,7 +99,7 @@ impl Controller {
         Ok(Self {
             phase: Phase::Idle,
             session: Session::new(&config),
-            link: Link::new(config.format, config.connection_size),
+            link: Link::of(&config),
             services: Services::new(config.time_outs.service),
             axes: (1..)
                 .zip(config.axes.iter().cloned())
@@ -436,7 +436,7 @@ impl Controller {
         self.config.connection_serial = self.config.connection_serial.wrapping_add(1);
         self.config.t_to_o_id = self.config.t_to_o_id.wrapping_add(1);
         self.session = Session::new(&self.config);
-        self.link = Link::new(self.config.format, self.config.connection_size);
+        self.link = Link::of(&self.config);
         self.services = Services::new(self.config.time_outs.service);
         self.axes.iter_mut().for_each(Axis::reconnect);
         self.traffic = Traffic::default();

@@ -3,6 +3,7 @@
 use core::net::SocketAddrV4;
 use std::collections::VecDeque;
 
+use super::config::ControllerConfig;
 use super::misbehaviour::Spoil;
 use super::services::Room;
 use super::session::Opened;
@@ -10,7 +11,7 @@ use super::sets::ACTUAL_HEADER_MAX;
 use crate::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
 use crate::wire::motion::fixed::{FixedActual, FixedCommand};
 use crate::wire::motion::header::CommandHeader;
-use crate::wire::motion::{ActualFrame, CommandInstance, CommandWriter, Format};
+use crate::wire::motion::{ActualFrame, CommandInstance, CommandWriter, FORMAT_REVISION, Format, run_idle};
 use crate::wire::{Error, Writer};
 use profile_generic::time::MonotonicTime;
 
@@ -55,6 +56,8 @@ const MESSAGE_ROOM: Room = Room { request: 480, response: 480 };
 #[derive(Debug)]
 pub(super) struct Link {
     opened: Option<Opened>,
+    /// Format Revision.
+    revision: u8,
     format: Format,
     size: usize,
     frame: Vec<u8>,
@@ -77,10 +80,16 @@ struct Received {
 }
 
 impl Link {
+    /// The connection that a configuration asks for.
+    pub fn of(config: &ControllerConfig) -> Self {
+        Self { revision: config.format_revision, ..Self::new(config.format, config.connection_size) }
+    }
+
     pub fn new(format: Format, size: u16) -> Self {
         let size = usize::from(size);
         Self {
             opened: None,
+            revision: FORMAT_REVISION,
             format,
             size,
             frame: vec![0; CLASS1_HEADER_LEN + size],
@@ -131,7 +140,7 @@ impl Link {
         if self.format == Format::Fixed {
             return true;
         }
-        let fixed = |header: usize| SEQUENCE_COUNT_LEN + header;
+        let fixed = |header: usize| SEQUENCE_COUNT_LEN + run_idle::len(self.revision) + header;
         fixed(COMMAND_HEADER_MAX) + command <= self.size && fixed(ACTUAL_HEADER_MAX) + actual <= self.size
     }
 
@@ -141,7 +150,7 @@ impl Link {
             return MESSAGE_ROOM;
         }
         let cut = |header: usize, all: usize, axis: usize| {
-            let fixed = SEQUENCE_COUNT_LEN + header + all + SERVICE_HEADERS;
+            let fixed = SEQUENCE_COUNT_LEN + run_idle::len(self.revision) + header + all + SERVICE_HEADERS;
             let instance = INSTANCE_MAX.saturating_sub(axis + SERVICE_HEADERS);
             // Whole words, as the blocks are.
             self.size.saturating_sub(fixed).min(instance) / 4 * 4
@@ -162,11 +171,14 @@ impl Link {
         spoil: &Spoil,
     ) -> Result<(), Error> {
         let end = CLASS1_HEADER_LEN + self.size - SEQUENCE_COUNT_LEN;
-        let mut writer = CommandWriter::new(&mut self.frame[CLASS1_HEADER_LEN..end], header)?;
+        let data = &mut self.frame[CLASS1_HEADER_LEN..end];
+        let head = run_idle::len(self.revision);
+        let mut writer = CommandWriter::new(data.get_mut(head..).unwrap_or_default(), header)?;
         for instance in instances {
             writer.instance(&instance)?;
         }
-        let length = writer.finish();
+        let length = head + writer.finish();
+        run_idle::finish(self.revision, data);
         self.send_written(now, length, fresh, spoil)
     }
 
@@ -274,7 +286,11 @@ impl Link {
             return Err(Error::too_large("connection data", max, value));
         }
         let update = match self.format {
-            Format::Variable => Update::Variable(ActualFrame::parse(datagram.data)?),
+            Format::Variable => {
+                // Whether the device runs is in the header of the update as well, which says more.
+                let (_, update) = run_idle::split(self.revision, datagram.data)?;
+                Update::Variable(ActualFrame::parse_as(update, self.revision)?)
+            }
             Format::Fixed => Update::Fixed(FixedActual::parse(datagram.data)?),
         };
         let update_id = update.id();

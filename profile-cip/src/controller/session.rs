@@ -36,7 +36,7 @@ use crate::wire::forward_close::ForwardClose;
 use crate::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
 use crate::wire::list_identity::IdentityItem;
 use crate::wire::message_router::{Reply, Request};
-use crate::wire::motion::{FORMAT_REVISION, Format};
+use crate::wire::motion::Format;
 use crate::wire::network_parameters::{ConnectionType, NetworkParameters, Priority, SMALL_SIZE_MAX};
 use crate::wire::register_session::RegisterSession;
 use crate::wire::sockaddr::{SOCKADDR_LEN, SockaddrInfo};
@@ -628,7 +628,7 @@ fn connection_path(config: &ControllerConfig) -> Vec<u8> {
         }),
         Segment::class(MOTION_DEVICE_AXIS),
         Segment::connection_point(CONFIGURATION_POINT),
-        Segment::connection_point(u16::from(FORMAT_REVISION)),
+        Segment::connection_point(u16::from(config.format_revision)),
         Segment::Data(&block),
     ];
     let mut path = vec![0; path_len(&segments, Encoding::Padded)];

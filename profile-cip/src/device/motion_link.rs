@@ -33,6 +33,31 @@ pub struct SyncState {
     pub offset: i64,
 }
 
+/// How good the synchronization of the device's clock is, as it measures it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SyncQuality {
+    /// Variation of the System Time Offset about its mean, ns (class attribute 28); `u32::MAX` while none is measured.
+    pub variance: u32,
+    /// Boundary clocks between the grandmaster and this clock, and one more for this one.
+    pub steps_removed: u16,
+    /// Interval of Sync messages, as a power of two in seconds.
+    pub log_sync_interval: i8,
+}
+
+impl Default for SyncQuality {
+    fn default() -> Self {
+        Self { variance: u32::MAX, steps_removed: 0, log_sync_interval: 0 }
+    }
+}
+
+impl SyncQuality {
+    /// Sync Update Delay, seconds (class attribute 30): how long a change of the grandmaster takes to come here.
+    #[must_use]
+    pub fn update_delay(&self) -> f32 {
+        f32::from(self.steps_removed) * f32::from(self.log_sync_interval).exp2()
+    }
+}
+
 /// Names one request until its reply; never used twice by one adapter run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Token(pub u64);

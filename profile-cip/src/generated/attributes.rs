@@ -59,6 +59,15 @@ attributes! {
         Instance START_INHIBITS_MFG = 677, Word, Get, 0, "Start Inhibits - Mfg";
     }
     else {
+        Class MAX_INSTANCE = 2, "Max Instance";
+        Class NUMBER_OF_INSTANCES = 3, "Number of Instances";
+        Class OPTIONAL_ATTRIBUTE_LIST = 4, "Optional Attribute List";
+        Class OPTIONAL_SERVICE_LIST = 5, "Optional Service List";
+        Class MAX_CLASS_ATTRIBUTE = 6, "Maximum ID Number Class Attributes";
+        Class MAX_INSTANCE_ATTRIBUTE = 7, "Maximum ID Number Instance Attributes";
+        Class SYNC_VARIANCE = 28, "Sync Variance" ["Nanoseconds"];
+        Class SYNC_THRESHOLD = 29, "Sync Threshold" ["Nanoseconds"];
+        Class SYNC_UPDATE_DELAY = 30, "Sync Update Delay" ["Seconds"];
         Instance REGISTRATION_POSITION = 62, "Registration 1 Positive Edge Position" ["Position Control Units"];
         Instance REGISTRATION_TIME = 66, "Registration 1 Positive Edge Time" ["Nanoseconds"];
         Instance HOME_EVENT_POSITION = 70, "Home Event Position" ["Position Control Units"];

@@ -292,14 +292,17 @@ fn head(frame: &Frame, line: &mut Line) {
     line.push(code, 4);
 }
 
+/// No bit.
+const NO_BIT: u16 = 2;
+
 /// Counts stuff bits behind the bits that go past.
 struct Line {
     stuffing: Stuffing,
     /// Bits that belong to the head, of which stuff bits are no part.
     head: u32,
     passed: u32,
-    /// The last bit and how many of it stand in a row.
-    last: Option<bool>,
+    /// The last bit, [`NO_BIT`] before the first, and how many of it stand in a row.
+    last: u16,
     run: u32,
     /// Over all bits so far, stuff bits left out.
     crc: u16,
@@ -310,30 +313,27 @@ struct Line {
 impl Line {
     const fn new(head: u32) -> Self {
         let stuffing = Stuffing { head: 0, data: 0 };
-        Self { stuffing, head, passed: 0, last: None, run: 0, crc: 0, stuffed: false }
+        Self { stuffing, head, passed: 0, last: NO_BIT, run: 0, crc: 0, stuffed: false }
     }
 
     /// The lowest `count` bits of `value`, highest first.
     fn push(&mut self, value: u32, count: u32) {
         for place in (0..count).rev() {
-            self.bit(value >> place & 1 == 1);
+            self.bit(if value >> place & 1 == 1 { 1 } else { 0 });
         }
     }
 
-    fn bit(&mut self, bit: bool) {
-        let feedback = bit != (self.crc & 0x4000 != 0);
-        self.crc = self.crc << 1 & 0x7FFF;
-        if feedback {
-            self.crc ^= CLASSIC_POLYNOMIAL;
-        }
+    /// Without branches that depend on the bits, which nobody can foresee.
+    fn bit(&mut self, bit: u16) {
+        let feedback = (self.crc >> 14 ^ bit) & 1;
+        self.crc = self.crc << 1 & 0x7FFF ^ CLASSIC_POLYNOMIAL & feedback.wrapping_neg();
         self.passed += 1;
-        self.run = if self.last == Some(bit) { self.run + 1 } else { 1 };
-        self.last = Some(bit);
+        self.run = self.run * u32::from(self.last == bit) + 1;
         self.stuffed = self.run == RUN;
-        if self.stuffed {
-            *self.part() += 1;
-            (self.last, self.run) = (Some(!bit), 1);
-        }
+        *self.part() += u32::from(self.stuffed);
+        // A stuff bit is the first of the other value.
+        self.last = bit ^ u16::from(self.stuffed);
+        self.run -= u32::from(self.stuffed) * (RUN - 1);
     }
 
     fn part(&mut self) -> &mut u32 {

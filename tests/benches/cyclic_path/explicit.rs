@@ -53,6 +53,7 @@ impl Attributes {
             attributes: attributes.collect(),
             power_structure_class_id: 1,
             supports_sync: true,
+            sync_threshold: None,
             transmission_processing_ns: 100_000,
         };
         let device = MotionDevice::new(config).expect("a sound configuration");

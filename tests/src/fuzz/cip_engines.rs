@@ -79,6 +79,7 @@ impl Device {
             attributes: ATTRIBUTES.clone(),
             power_structure_class_id: 0,
             supports_sync: true,
+            sync_threshold: None,
             transmission_processing_ns: 100_000,
         })
         .expect("a device");

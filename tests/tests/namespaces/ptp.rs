@@ -95,7 +95,11 @@ fn synchronized(controller: &Namespace, python: &Path) -> Value {
 }
 
 fn octets<const N: usize>(object: &Value, attribute: u16) -> [u8; N] {
-    let text = object[attribute.to_string()].as_str().expect("a value");
+    octets_of(object, &attribute.to_string())
+}
+
+fn octets_of<const N: usize>(object: &Value, attribute: &str) -> [u8; N] {
+    let text = object[attribute].as_str().expect("a value");
     let octet = |place: usize| u8::from_str_radix(text.get(2 * place..2 * place + 2)?, 16).ok();
     let octets: Option<Vec<u8>> = (0..text.len() / 2).map(octet).collect();
     octets
@@ -147,6 +151,23 @@ fn the_box_follows_a_foreign_grandmaster_through_its_loss_and_a_better_one() {
     let local: [u8; 20] = octets(&object, 10);
     assert_ne!(local[..8], grandmaster_info[..8]);
     assert_eq!((octets(&object, 18), octets(&object, 19)), ([0], [1, 0]), "domain 0, ordinary clock");
+
+    // The class of the axes says the same: how well, within what, and how long a change takes to come here.
+    let variance = u32::from_le_bytes(octets_of(&object, "class 28"));
+    assert!((1..100_000).contains(&variance), "variation {variance} ns");
+    assert_eq!(
+        u32::from_le_bytes(octets_of(&object, "class 29")),
+        100_000,
+        "the threshold of the configuration"
+    );
+    assert_eq!(
+        f32::from_le_bytes(octets_of(&object, "class 30")).to_bits(),
+        1_f32.to_bits(),
+        "one step of a second"
+    );
+    for (attribute, expected) in [("class 2", [2, 0]), ("class 3", [2, 0]), ("class 6", [35, 0])] {
+        assert_eq!(octets_of(&object, attribute), expected, "{attribute}");
+    }
 
     // What the box sends, as Wireshark reads it.
     drop(tshark);

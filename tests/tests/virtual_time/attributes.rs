@@ -420,3 +420,36 @@ fn attributes_are_what_the_table_of_truths_says() {
     }
     insta::assert_snapshot!(shown);
 }
+
+/// A box on the clock of its host measures no variation: the rows of it are not there, instead of a number that nobody has measured.
+#[test]
+fn every_attribute_of_the_class_says_what_is_so() {
+    let (mut rig, client) = rig_in(AxisState::Stopped);
+    let mapping = Mapping::embedded().expect("the shipped tables are sound");
+    let mut table = String::new();
+    for row in mapping.dictionaries.cip.class_attributes() {
+        let (status, value) = client.ask(&mut rig, GET, 0, Some(row.id), &[]);
+        let shown = match (status, row.id) {
+            (OK, 19 | 20) => format!("{} octets of time", value.len()),
+            (OK, 4) => {
+                let ids: Vec<u16> =
+                    value.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+                assert_eq!(usize::from(ids[0]), ids.len() - 1);
+                // What a drive lacks is in the list of the class, and refused for the axis.
+                for row in mapping.dictionaries.cip.attributes() {
+                    let answers = client.ask(&mut rig, GET, 1, Some(row.id), &[]).0 == OK;
+                    let optional = !row.need.chars().skip(3).any(|need| need == 'R');
+                    let listed = ids[1..].contains(&row.id);
+                    assert!(!listed || optional, "{} is required", row.id);
+                    assert!(listed || !(answers && optional), "{} answers", row.id);
+                }
+                format!("{} attributes", ids[0])
+            }
+            (OK, _) => value.iter().map(|octet| format!("{octet:02x}")).collect(),
+            _ => format!("status 0x{status:02X}"),
+        };
+        let (set, _) = client.ask(&mut rig, SET, 0, Some(row.id), &value);
+        writeln!(table, "{:>2} {:<37} {shown}; set: 0x{set:02X}", row.id, row.name).expect("a string");
+    }
+    insta::assert_snapshot!(table);
+}

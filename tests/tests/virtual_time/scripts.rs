@@ -123,3 +123,15 @@ fn fixed_format() {
     assert!(rig.log().contains("the class: read 32=[03] 33=[00]"), "{}", rig.log());
     assert!(rig.log().contains("node fault: Data Format Error"), "{}", rig.log());
 }
+
+/// Connection point 3: a run/idle header in front of each update, both ways. Everything else is as ever.
+#[test]
+fn a_controller_of_format_revision_3_moves_its_axes() {
+    let script = "[connection]\nconnection_point = 3\n[axis.1]\ncounts_per_unit = 1_000_000\n\
+         limits = { velocity = 5, acceleration = 50 }\n[[step]]\nenable = 1\n\
+         [[step]]\nmove = { axis = 1, to = 1.5, velocity = 2, acceleration = 10 }\n[[step]]\ndisable = 1\n";
+    let (rig, report) = run_text(script, Settings::default());
+    assert_eq!((report.failure, report.steps_finished), (None, 4), "{}", rig.log());
+    assert!((rig.position(0) - 1_500_000_000).abs() < 10_000_000, "{}", rig.position(0));
+    assert!(rig.torque_free());
+}

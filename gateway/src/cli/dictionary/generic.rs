@@ -1,7 +1,7 @@
 //! The generic dictionary as a table.
 
 use super::sheet::{Cell, Sheet};
-use crate::mapping::{GenericDictionary, GenericParameter};
+use crate::mapping::{GenericParameter, Mapping, Places};
 
 /// What a parameter is; that of an overlay has its range here.
 fn note(row: &GenericParameter) -> String {
@@ -11,10 +11,18 @@ fn note(row: &GenericParameter) -> String {
     }
 }
 
-/// Parameters, by number, and the signals of the process image, which have none.
-pub fn instance(dictionary: &GenericDictionary) -> Sheet {
-    const COLUMNS: &[&str] = &["id", "name", "kind", "quantity", "unit", "data_type", "access", "note"];
+/// Where a value is on each side.
+fn places(places: &Places) -> [Cell; 3] {
+    [&places.cip, &places.sercos, &places.cia402].map(|side| side.join(", ").as_str().into())
+}
+
+/// Parameters, by number, and the signals of the process image, which have none, with where each is on both sides.
+pub fn instance(mapping: &Mapping) -> Sheet {
+    const COLUMNS: &[&str] =
+        &["id", "name", "kind", "quantity", "unit", "data_type", "access", "cip", "sercos", "cia402", "note"];
+    let dictionary = &mapping.dictionaries.generic;
     let parameters = dictionary.parameters().iter().map(|row| {
+        let [cip, sercos, cia402] = places(&mapping.places_of_parameter(row.parameter));
         vec![
             row.parameter.0.into(),
             row.name.as_str().into(),
@@ -23,10 +31,14 @@ pub fn instance(dictionary: &GenericDictionary) -> Sheet {
             row.quantity.unit().into(),
             row.kind.name().into(),
             row.access.name().into(),
+            cip,
+            sercos,
+            cia402,
             note(row).as_str().into(),
         ]
     });
     let signals = dictionary.signals().iter().map(|signal| {
+        let [cip, sercos, cia402] = places(&mapping.places_of_signal(*signal));
         vec![
             Cell::None,
             signal.name().into(),
@@ -35,6 +47,9 @@ pub fn instance(dictionary: &GenericDictionary) -> Sheet {
             signal.quantity().unit().into(),
             "integer".into(),
             if signal.is_command() { "command" } else { "feedback" }.into(),
+            cip,
+            sercos,
+            cia402,
             "".into(),
         ]
     });

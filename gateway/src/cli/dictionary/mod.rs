@@ -10,7 +10,7 @@ use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 
 use super::{CliError, DictionaryArguments, DictionaryFormat, DictionaryPart, DictionaryProfile, usage};
-use crate::mapping::{Dictionaries, IdnPart, Mapping};
+use crate::mapping::{IdnPart, Mapping};
 use sheet::Sheet;
 
 /// Prints to standard output.
@@ -27,7 +27,7 @@ fn print(arguments: &DictionaryArguments, out: &mut dyn Write) -> Result<ExitCod
         None => Mapping::embedded(),
     };
     let mapping = mapping.map_err(|errors| errors.to_string())?;
-    let sheet = match sheet(&mapping.dictionaries, arguments.profile, arguments.part) {
+    let sheet = match sheet(&mapping, arguments.profile, arguments.part) {
         Ok(sheet) => sheet,
         Err(message) => return Ok(usage(&message)),
     };
@@ -45,13 +45,14 @@ fn print(arguments: &DictionaryArguments, out: &mut dyn Write) -> Result<ExitCod
 
 /// What is asked for, or why there is no such thing.
 fn sheet(
-    dictionaries: &Dictionaries,
+    mapping: &Mapping,
     profile: DictionaryProfile,
     part: Option<DictionaryPart>,
 ) -> Result<Sheet, String> {
     use DictionaryPart::{
         Bits, Class, Codes, Communication, Enums, Faults, Idns, Instance, Networks, Objects, Services,
     };
+    let dictionaries = &mapping.dictionaries;
     Ok(match (profile, part) {
         (DictionaryProfile::Cip, None | Some(Instance)) => cip::instance(&dictionaries.cip),
         (DictionaryProfile::Cip, Some(Class)) => cip::class(&dictionaries.cip),
@@ -68,7 +69,7 @@ fn sheet(
         (DictionaryProfile::Sercos, Some(Codes)) => sercos::codes(&dictionaries.sercos),
         (DictionaryProfile::Cia402, None | Some(Objects)) => cia402::objects(&dictionaries.cia402),
         (DictionaryProfile::Cia402, Some(Codes)) => cia402::codes(&dictionaries.cia402),
-        (DictionaryProfile::Generic, None | Some(Instance)) => generic::instance(&dictionaries.generic),
+        (DictionaryProfile::Generic, None | Some(Instance)) => generic::instance(mapping),
         (_, Some(part)) => return Err(no_part(profile, part)),
     })
 }

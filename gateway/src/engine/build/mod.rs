@@ -31,7 +31,7 @@ use super::bus::{self, AnyBus, Buses};
 use super::device::{DeviceChannel, MemberConfig, StopDefaults};
 use super::notice::Notice;
 use super::{Engine, Parts};
-use crate::config::{Axis, AxisFunction, AxisKind, Config, Device, DriveAt, StoppingAction};
+use crate::config::{Axis, AxisFunction, AxisKind, Config, Device, DriveAt, StoppingAction, TimeSource};
 use crate::eds;
 use crate::latest::{self, Reader};
 use crate::mapping::{CipProgram, CipScaling, Mapping};
@@ -153,7 +153,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         let number = u8::try_from(number).unwrap_or(u8::MAX);
         let channel = DeviceChannel::new(
             number,
-            device_config(device, &members, &mapping, config.lead),
+            device_config(device, &members, &mapping, config),
             device_end,
             configs,
             &mapping,
@@ -315,8 +315,12 @@ fn device_config(
     device: &Device,
     members: &[(usize, &Axis)],
     mapping: &Mapping,
-    lead: DurationNs,
+    config: &Config,
 ) -> DeviceConfig {
+    // Updates of the fixed format have no time stamps.
+    let supports_sync = device.connection_format == Format::Variable;
+    let measures_time = matches!(config.time.source, TimeSource::Ptp | TimeSource::Daemon);
+    let threshold = u32::try_from(config.time.threshold.magnitude()).unwrap_or(u32::MAX);
     let axis = |(_, axis): &(usize, &Axis)| AxisConfig {
         kind: match axis.function {
             AxisFunction::Drive => ControlKind::Active,
@@ -335,9 +339,9 @@ fn device_config(
         axes: members.iter().map(axis).collect(),
         attributes: Vec::new(),
         power_structure_class_id: device.power_structure_class_id,
-        // Updates of the fixed format have no time stamps.
-        supports_sync: device.connection_format == Format::Variable,
-        transmission_processing_ns: (lead + TRANSMISSION_PROCESSING).magnitude(),
+        supports_sync,
+        sync_threshold: (supports_sync && measures_time).then_some(threshold),
+        transmission_processing_ns: (config.lead + TRANSMISSION_PROCESSING).magnitude(),
     }
 }
 

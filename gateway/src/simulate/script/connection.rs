@@ -1,16 +1,17 @@
 //! `[connection]` and `[axis.N]`: everything about the device before the first step.
 
 use std::net::Ipv4Addr;
+use std::ops::RangeInclusive;
 
 use profile_cip::controller::config::{KeyExpectation, MAX_AXES, TimeOuts};
 use profile_cip::controller::limits::AxisLimits;
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AttributeSet, AxisSetup, ControllerConfig, Scaling};
-use profile_cip::wire::motion::Format;
 use profile_cip::wire::motion::codes::{
     ActualDataSet, CommandDataSet, CommandTarget, ControlMode, FeedbackMode, FeedbackSource, StatusDataSet,
     TimeDataSet,
 };
+use profile_cip::wire::motion::{FORMAT_REVISION, Format};
 use profile_generic::time::DurationNs;
 use toml::de::DeValue;
 
@@ -71,7 +72,9 @@ pub(super) const TIMES: &[(&str, TimeDataSet)] = &[
 ];
 pub(super) const FORMATS: &[(&str, Format)] = &[("variable", Format::Variable), ("fixed", Format::Fixed)];
 /// Keys for which an update of the fixed format has no room.
-const VARIABLE_ONLY: [&str; 3] = ["grand_master", "size", "time_data"];
+const VARIABLE_ONLY: [&str; 4] = ["connection_point", "grand_master", "size", "time_data"];
+/// Connection points, which are format revisions.
+const POINTS: RangeInclusive<i128> = 2..=3;
 pub(super) const ACTUAL_POSITION_TYPES: &[(&str, bool)] = &[("DINT", false), ("LINT", true)];
 pub(super) const POSITION_TYPES: &[(&str, bool)] = &[("LREAL", false), ("DINT", true)];
 
@@ -211,6 +214,7 @@ fn variable(keys: &mut Keys<'_, '_>, config: &mut ControllerConfig) -> Option<()
     if let Some(value) = keys.find("time_data") {
         config.time_data = time_data(value, problems)?;
     }
+    config.format_revision = keys.integer_or("connection_point", POINTS, FORMAT_REVISION)?;
     Some(())
 }
 

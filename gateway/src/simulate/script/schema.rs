@@ -117,6 +117,7 @@ fn connection(names: &Names) -> Value {
         ("synchronous", boolean()),
         ("grand_master", hex()),
         ("size", whole(50, 1400)),
+        ("connection_point", whole(2, 3)),
         ("command_target", word_of(TARGETS)),
         ("time_data", words(TIMES)),
         ("late_after", whole(1, 255)),

@@ -46,6 +46,12 @@ impl Daemon {
         Self { client: Client::new(socket, config.domain), phc, watch: Watch::new(config), turn: 0 }
     }
 
+    /// The clock is synchronized within another threshold from the next offset on, ns.
+    pub fn set_threshold(&mut self, threshold: u64) {
+        self.watch.status.threshold = threshold;
+        self.watch.judge.set_threshold(threshold);
+    }
+
     /// Looks at clock and daemon, four times in a second.
     pub fn look(&mut self, now: MonotonicTime) -> &TimeStatus {
         let reading = match &self.phc {

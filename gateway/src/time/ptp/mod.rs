@@ -309,6 +309,9 @@ pub fn follow(
         if wire.take_forget() {
             follower.forget();
         }
+        if let Some(threshold) = wire.threshold() {
+            follower.set_threshold(threshold);
+        }
         if follower.pass(now) {
             report(follower.status(now, &port.guard));
         }
@@ -354,6 +357,13 @@ impl Follower {
     /// The largest offset begins anew.
     fn forget(&mut self) {
         (self.status.max_offset, self.changed) = (0, true);
+    }
+
+    /// The clock is synchronized within another threshold from the next offset on, ns.
+    fn set_threshold(&mut self, threshold: u64) {
+        self.changed |= self.status.threshold != threshold;
+        self.status.threshold = threshold;
+        self.judge.set_threshold(threshold);
     }
 
     /// Looks whether another master is followed.

@@ -87,6 +87,8 @@ struct Network {
     /// Messages of others, made anew each second.
     others: fn(u64) -> Vec<UnderWay>,
     requests: u64,
+    /// Threshold that a controller has said, ns.
+    threshold: Option<u64>,
 }
 
 impl Network {
@@ -99,6 +101,7 @@ impl Network {
             made: 0,
             others: |_| Vec::new(),
             requests: 0,
+            threshold: None,
         }
     }
 
@@ -189,6 +192,10 @@ impl Wire for Network {
 
     fn is_ended(&self) -> bool {
         self.now >= self.end
+    }
+
+    fn threshold(&self) -> Option<u64> {
+        self.threshold
     }
 }
 
@@ -399,4 +406,19 @@ fn what_strangers_send_moves_nothing() {
     ] {
         assert!(refused(reason) >= 80, "{reason}: {}", refused(reason));
     }
+}
+
+/// A network whose Syncs are some ten microseconds off: synchronized for a controller that takes as much, and for no other.
+#[test]
+fn what_counts_as_synchronized_is_what_the_controller_says() {
+    let master = Clock { jitter: Some((2, 60_000)), ..MASTER };
+    let with = |threshold| {
+        let network = Network { threshold, ..Network::new(&[master], 40) };
+        let (run, status) = run(network);
+        (run.last().unwrap().1, status.threshold)
+    };
+    assert!(!with(None).0.is_synchronized(), "{:?}", with(None));
+    assert_eq!(with(Some(100_000)), (SyncPhase::Synchronized, 100_000));
+    let exact = |threshold| run(Network { threshold, ..Network::new(&[MASTER], 40) }).0.last().unwrap().1;
+    assert_eq!(exact(Some(1_000)), SyncPhase::Synchronized);
 }

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
 use profile_generic::time::MonotonicTime;
 
@@ -38,6 +38,11 @@ pub trait Wire {
     fn take_forget(&mut self) -> bool {
         false
     }
+
+    /// Largest offset of a synchronized clock, ns, if somebody has said another one than that of the configuration.
+    fn threshold(&self) -> Option<u64> {
+        None
+    }
 }
 
 /// What a clock is told while it runs.
@@ -49,6 +54,8 @@ pub struct Control {
     pub domain: AtomicU8,
     /// The largest offset begins anew.
     pub forget: AtomicBool,
+    /// Largest offset of a synchronized clock, ns.
+    pub threshold: AtomicU64,
 }
 
 /// The sockets of the host.
@@ -87,5 +94,9 @@ impl Wire for HostWire {
 
     fn take_forget(&mut self) -> bool {
         self.control.forget.swap(false, Ordering::Relaxed)
+    }
+
+    fn threshold(&self) -> Option<u64> {
+        Some(self.control.threshold.load(Ordering::Relaxed))
     }
 }

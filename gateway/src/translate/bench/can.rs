@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use arrayvec::ArrayVec;
 use profile_cia402::master::config::Direction;
 use profile_cia402::wire::Mux;
 use profile_generic::can::{Frame, Id};
@@ -25,6 +26,9 @@ const FUNCTION: u16 = 0x780;
 /// Command specifiers of expedited SDOs: upload request, and the answer to it with `4 - n` bytes.
 const UPLOAD: u8 = 0x40;
 const UPLOADED: u8 = 0x43;
+
+/// Most bytes of a frame.
+const FRAME_MAX: usize = 64;
 
 /// Bytes of the controlword, the first value of the program.
 const CONTROL_LEN: usize = 2;
@@ -156,7 +160,7 @@ impl CanPort for Tap {
         let CanInput::Frame(frame) = &input else { return Some(input) };
         let Id::Standard(id) = frame.id() else { return Some(input) };
         let is_tpdo = |pdo: &&CanPdo| pdo.id == id && pdo.direction == Direction::Transmit;
-        let mut data = frame.data().to_vec();
+        let mut data: ArrayVec<u8, FRAME_MAX> = frame.data().iter().copied().collect();
         for drive in &mut self.known {
             let Some(pdo) = drive.pdos.iter().find(is_tpdo) else { continue };
             self.peers[drive.axis].show(&mut drive.feedback);
@@ -175,7 +179,7 @@ impl CanPort for Tap {
             self.hear_sdo(id, frame.data());
         }
         let is_rpdo = |pdo: &&CanPdo| pdo.id == id && pdo.direction == Direction::Receive;
-        let mut data = frame.data().to_vec();
+        let mut data: ArrayVec<u8, FRAME_MAX> = frame.data().iter().copied().collect();
         for drive in &mut self.known {
             let Some(pdo) = drive.pdos.iter().find(is_rpdo) else { continue };
             CanDrive::gather(pdo, frame.data(), &mut drive.command);

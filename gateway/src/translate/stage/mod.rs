@@ -7,7 +7,7 @@ mod can;
 mod devicenet;
 mod values;
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use profile_cip::wire::motion::Format;
@@ -142,7 +142,7 @@ pub struct Stage {
     /// The SERCOS telegrams of CP4.
     pub layout: Layout,
     /// Names of IDNs and objects that were looked up.
-    labels: Mutex<HashMap<Item, Arc<str>>>,
+    labels: Mutex<BTreeMap<Item, Arc<str>>>,
 }
 
 /// Why there are no programs.

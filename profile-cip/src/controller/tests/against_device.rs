@@ -216,6 +216,7 @@ fn device(format: Format, axes: usize) -> MotionDevice {
         ],
         power_structure_class_id: 0x0A0B_0C0D,
         supports_sync: format == Format::Variable,
+        sync_threshold: None,
         transmission_processing_ns: 200_000,
     })
     .unwrap()

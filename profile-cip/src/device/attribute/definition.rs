@@ -81,6 +81,8 @@ pub struct AttributeDefinition {
     pub codes: Vec<u32>,
     /// Bits of a bit field that mean something; the others have to be 0.
     pub bits: Option<u64>,
+    /// The standard requires it of no device that closes a loop.
+    pub is_optional: bool,
     /// Name of the standard.
     pub name: String,
 }
@@ -92,6 +94,16 @@ pub struct ElementRule {
     pub default: DefaultValue,
     /// Its permitted values, ends included.
     pub range: (f64, f64),
+    /// A value that leaves the element as it is, in the octets of the type; it is taken and not stored.
+    pub keeps: Option<u8>,
+}
+
+impl ElementRule {
+    /// Whether a value leaves the element as it is.
+    #[must_use]
+    pub fn keeps_with(&self, element: &[u8]) -> bool {
+        self.keeps.is_some_and(|keeps| element == [keeps])
+    }
 }
 
 impl AttributeDefinition {
@@ -111,6 +123,7 @@ impl AttributeDefinition {
             element_rules: Vec::new(),
             codes: Vec::new(),
             bits: None,
+            is_optional: false,
             name: name.to_owned(),
         }
     }

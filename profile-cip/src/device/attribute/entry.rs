@@ -89,6 +89,9 @@ impl Entry {
         let size = usize::from(definition.data_type.size());
         for (index, element) in (part.start..).zip(value.chunks_exact(size)) {
             let rule = definition.element_rules.get(usize::from(index));
+            if rule.is_some_and(|rule| rule.keeps_with(element)) {
+                continue;
+            }
             let range = rule.map_or(definition.range, |rule| Some(rule.range));
             check_value(definition, range, element).map_err(|status| (status, index))?;
         }

@@ -5,6 +5,7 @@
 //! Lookup is a binary search in a sorted table; values of an instance are one run of octets. Nothing is allocated
 //! after construction.
 
+pub(super) mod class;
 mod data_type;
 mod definition;
 mod engine;

@@ -72,6 +72,27 @@ impl AttributeStore {
         Ok(())
     }
 
+    /// As [`AttributeStore::put`] does, but leaves elements whose value says so as they are ([`ElementRule::keeps`]).
+    ///
+    /// # Errors
+    /// As [`AttributeStore::put`].
+    ///
+    /// [`ElementRule::keeps`]: super::ElementRule::keeps
+    pub fn set(&mut self, entry: &Entry, part: Part, value: &[u8]) -> Result<(), GeneralStatus> {
+        let rules = entry.definition.element_rules.get(usize::from(part.start)..).unwrap_or(&[]);
+        if rules.iter().zip(value).all(|(rule, octet)| !rule.keeps_with(&[*octet])) {
+            return self.put(entry, part, value);
+        }
+        for ((index, rule), octet) in
+            (part.start..).zip(rules).zip(value.iter().take(usize::from(part.count)))
+        {
+            if !rule.keeps_with(&[*octet]) {
+                self.put(entry, Part { start: index, count: 1 }, &[*octet])?;
+            }
+        }
+        Ok(())
+    }
+
     /// A number that is another one after a value has changed: what was made of the values before may be kept as long as it
     /// is the same.
     #[must_use]

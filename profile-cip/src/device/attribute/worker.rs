@@ -126,7 +126,7 @@ impl AttributeSpace<'_> {
             return Executed::Refused(status, index);
         }
         if entry.definition.backing == Backing::Stored {
-            return match self.store.put(entry, part, value) {
+            return match self.store.set(entry, part, value) {
                 Ok(()) => Executed::Done,
                 Err(status) => Executed::Refused(status, part.start),
             };

@@ -21,6 +21,7 @@ use crate::device::objects::class::CLASS_MOTION_DEVICE_AXIS;
 use crate::wire::Reader;
 use crate::wire::epath::{Encoding, Segment, emit_path, path_len};
 use crate::wire::forward_open::{ForwardOpen, Transport, Trigger};
+use crate::wire::motion::{FORMAT_REVISION, FORMAT_REVISION_RUN_IDLE, Format};
 use crate::wire::network_parameters::{ConnectionType, NetworkParameters};
 use crate::wire::status::{ConnectionStatus, GeneralStatus};
 
@@ -28,10 +29,9 @@ use crate::wire::status::{ConnectionStatus, GeneralStatus};
 const CONFIGURATION_POINT_1: u16 = 0x51;
 /// Configuration connection point of block revision 2.
 const CONFIGURATION_POINT_2: u16 = 0x52;
-/// Format revision of the connection data.
-pub(crate) const FORMAT_REVISION: u8 = 2;
-/// I/O connection point, which is the format revision.
+/// I/O connection points, which are the format revisions: that of this edition, and that of a later one with a run/idle header.
 const IO_POINT: u16 = FORMAT_REVISION as u16;
+const IO_POINT_RUN_IDLE: u16 = FORMAT_REVISION_RUN_IDLE as u16;
 
 /// Transport of the connection: class 1, cyclic, and the device is no server of it (clauses 6-2.5 and 7-1.1).
 pub const TRANSPORT: Transport = Transport { server: false, trigger: Trigger::CYCLIC, class: 1 };
@@ -64,8 +64,8 @@ pub fn application_path(config: &MotionConfig) -> Vec<u8> {
 const CLASS_ID_MISMATCH: u16 = 0x04;
 const AXIS_ID_MISMATCH: u16 = 0x05;
 
-/// Checks the connection points and the configuration block.
-pub(crate) fn check_path(path: &MotionPath<'_>, config: &MotionConfig) -> Result<(), Refusal> {
+/// Checks the connection points and the configuration block. Returns the format revision of the connection data.
+pub(crate) fn check_path(path: &MotionPath<'_>, config: &MotionConfig) -> Result<u8, Refusal> {
     let inconsistent = |found: u16, expected: u16| {
         Refusal::value(ConnectionStatus::INCONSISTENT_PATHS, u32::from(found), u32::from(expected))
     };
@@ -77,13 +77,18 @@ pub(crate) fn check_path(path: &MotionPath<'_>, config: &MotionConfig) -> Result
         CONFIGURATION_POINT_2 => 2,
         other => return Err(inconsistent(other, CONFIGURATION_POINT_1)),
     };
-    if io.is_empty() {
-        return Err(inconsistent(configuration, IO_POINT));
+    let Some(&point) = io.first() else { return Err(inconsistent(configuration, IO_POINT)) };
+    let format = match point {
+        IO_POINT => FORMAT_REVISION,
+        // The fixed format has no later revision.
+        IO_POINT_RUN_IDLE if config.format == Format::Variable => FORMAT_REVISION_RUN_IDLE,
+        other => return Err(inconsistent(other, IO_POINT)),
+    };
+    if let Some(other) = io.iter().find(|other| **other != point) {
+        return Err(inconsistent(*other, point));
     }
-    if let Some(other) = io.iter().find(|point| **point != IO_POINT) {
-        return Err(inconsistent(*other, IO_POINT));
-    }
-    check_block(path.data.unwrap_or(&[]), revision, config)
+    check_block(path.data.unwrap_or(&[]), revision, config)?;
+    Ok(format)
 }
 
 fn check_block(block: &[u8], revision: u8, config: &MotionConfig) -> Result<(), Refusal> {

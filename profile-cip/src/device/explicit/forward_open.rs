@@ -73,11 +73,11 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
             Ok(Opened::Now { o_to_t_id, t_to_o_id: open.t_to_o_id })
         }
         Application::Motion(path) => {
-            motion::check_path(&path, &node.config.motion)?;
+            let format_revision = motion::check_path(&path, &node.config.motion)?;
             motion::check_parameters(open, &node.config.motion)?;
             node.connections.check_owner()?;
             node.check_reset()?;
-            open_motion(node, origin, open)
+            open_motion(node, origin, open, format_revision)
         }
     }
 }
@@ -105,7 +105,12 @@ fn null_open(
     Ok(Opened::Now { o_to_t_id, t_to_o_id })
 }
 
-fn open_motion(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Opened, Refusal> {
+fn open_motion(
+    node: &mut Node,
+    origin: &Origin,
+    open: &ForwardOpen<'_>,
+    format_revision: u8,
+) -> Result<Opened, Refusal> {
     // Point to point goes back to the peer itself, so of its socket address only the port counts. A group
     // address there is a mistake the originator has to hear of.
     let port = match origin.t_to_o_socket {
@@ -132,7 +137,7 @@ fn open_motion(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Resu
         o_to_t_variable: open.o_to_t.variable,
         t_to_o_variable: open.t_to_o.variable,
         t_to_o_dscp: node.qos_in_use.of_priority(open.t_to_o.priority),
-        format_revision: motion::FORMAT_REVISION,
+        format_revision,
     };
     node.ask(MotionRequest::Open(parameters)).map_err(|status| Refusal::new(status, 0))?;
     let owner = Owner { open: parameters, peer: origin.peer, multiplier: open.timeout_multiplier };

@@ -1,6 +1,6 @@
 //! System time of the device and the controller's time stamps in it.
 
-use crate::device::motion_link::SyncState;
+use crate::device::motion_link::{SyncQuality, SyncState};
 use crate::reported::Reported;
 use crate::time_offset::{OffsetCompensation, Offsets};
 use crate::wire::motion::codes::SyncStatus;
@@ -11,6 +11,7 @@ use crate::wire::status::GeneralStatus;
 #[derive(Default)]
 pub(super) struct Clock {
     sync: SyncState,
+    quality: SyncQuality,
     compensation: OffsetCompensation,
     reported_offset: Reported<i64>,
 }
@@ -31,6 +32,14 @@ impl Clock {
 
     pub fn is_synchronized(&self) -> bool {
         self.sync.synchronized
+    }
+
+    pub fn set_quality(&mut self, quality: SyncQuality) {
+        self.quality = quality;
+    }
+
+    pub fn quality(&self) -> SyncQuality {
+        self.quality
     }
 
     /// A system time on the local clock, so that a step of the device's own is none of the controller's.

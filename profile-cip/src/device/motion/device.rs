@@ -34,8 +34,8 @@ use crate::device::axis::fault_log::{FaultLog, LogEntry};
 use crate::device::axis::refused::RefusedRequest;
 use crate::device::axis::state::AxisState;
 use crate::device::axis::{AxisConfig, FaultWords, PositionView};
-pub use crate::device::motion_link::SyncState;
 use crate::device::motion_link::{MotionReply, MotionRequest, OpenParameters};
+pub use crate::device::motion_link::{SyncQuality, SyncState};
 use crate::device::objects::identity::ModuleState;
 use crate::device::visualization::display::{self, Line, NodeCondition};
 use crate::device::visualization::{self, AxisCondition, Indication};
@@ -60,6 +60,9 @@ pub struct DeviceConfig {
     pub power_structure_class_id: u32,
     /// Whether the device has a synchronized system time (CIP Sync).
     pub supports_sync: bool,
+    /// Largest variation of system time with which the clock counts as synchronized as long as no controller says another one, ns;
+    /// `None` if the clock of the device measures none.
+    pub sync_threshold: Option<u32>,
     /// Time to produce a D-to-C update before its cycle starts, ns (Transmission Processing Time, clause 7-1.3).
     pub transmission_processing_ns: u64,
 }
@@ -312,6 +315,17 @@ impl MotionDevice {
         if step != 0 {
             self.engine.instances.slots.iter_mut().for_each(|slot| slot.axis.events.shift(step));
         }
+    }
+
+    /// Says how good the synchronization of the device's clock is.
+    pub fn set_sync_quality(&mut self, quality: SyncQuality) {
+        self.engine.clock.set_quality(quality);
+    }
+
+    /// Sync Threshold of the controller that is connected (class attribute 29), ns: the clock of the device has to go by it.
+    #[must_use]
+    pub fn sync_threshold(&self) -> Option<u64> {
+        self.engine.connection.as_ref().and_then(|_| self.engine.instances.sync_threshold())
     }
 
     /// An event that the drive was armed for has occurred, or cannot be found for the reason `status`, which is then not

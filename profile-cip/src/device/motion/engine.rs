@@ -16,7 +16,7 @@ use crate::device::axis::Context;
 use crate::device::axis::exception::ExceptionActions;
 use crate::device::motion_link::{CloseParameters, MotionReply, OpenParameters, OpenRefusal};
 use crate::wire::motion::codes::{NodeAlarm, NodeControl, NodeFault};
-use crate::wire::motion::{FORMAT_REVISION, Format};
+use crate::wire::motion::{FORMAT_REVISION, FORMAT_REVISION_RUN_IDLE, Format};
 use crate::wire::status::GeneralStatus;
 
 /// Instances of an update: the class and the axes.
@@ -94,7 +94,10 @@ impl Engine {
         if self.connection.is_some() {
             return refuse(OWNERSHIP_CONFLICT);
         }
-        if parameters.format_revision != FORMAT_REVISION {
+        let has_run_idle = parameters.format_revision == FORMAT_REVISION_RUN_IDLE;
+        if parameters.format_revision != FORMAT_REVISION
+            && !(has_run_idle && self.config.format == Format::Variable)
+        {
             return refuse(INVALID_CONNECTION_POINT);
         }
         fixed::check_format(self.config.format, &parameters)?;
@@ -157,6 +160,10 @@ impl Engine {
             }
             if connection.schedule.mode == Mode::Synchronous {
                 self.node.synchronization(self.clock.is_synchronized(), now);
+                let variance = u64::from(self.clock.quality().variance);
+                if self.instances.sync_threshold().is_some_and(|threshold| variance > threshold) {
+                    self.node.jitter(now);
+                }
             }
         }
         self.step(system_time);
@@ -187,6 +194,7 @@ impl Engine {
         }
         let header = self.connection.as_ref().and_then(|c| c.header);
         let (lost, late) = self.statistics.diagnostics();
+        let quality = self.clock.quality();
         self.instances.publish_class(&[
             (id::NODE_CONTROL, header.map_or(0, |h| u64::from(h.node_control.bits()))),
             (id::NODE_STATUS, u64::from(self.node_status().bits())),
@@ -194,6 +202,8 @@ impl Engine {
             (id::NODE_ALARM_CODE, u64::from(self.node.alarm().0)),
             (id::CONTROLLER_UPDATE_PERIOD, self.connection.as_ref().map_or(0, IoConnection::period)),
             (id::CONTROLLER_TIME_STAMP, header.and_then(|h| h.time_stamp).unwrap_or(0)),
+            (id::SYNC_VARIANCE, u64::from(quality.variance)),
+            (id::SYNC_UPDATE_DELAY, u64::from(quality.update_delay().to_bits())),
             (id::TIME_DATA_SET, header.map_or(0, |h| u64::from(h.time_data_set().bits()))),
             (id::LOST_UPDATES, u64::from(lost)),
             (id::LATE_UPDATES, u64::from(late)),

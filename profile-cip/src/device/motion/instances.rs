@@ -3,6 +3,7 @@
 use super::device::DeviceConfig;
 use super::service_channel::ServiceChannel;
 use super::slot::Slot;
+use crate::device::attribute::class::{self, ClassFacts};
 use crate::device::attribute::worker::{AttributeAccess, AttributeSpace};
 use crate::device::attribute::{AttributeStore, AttributeTable, Scope, TableError, id};
 use crate::device::axis::Context;
@@ -27,8 +28,14 @@ pub(super) struct Instances {
 
 impl Instances {
     pub fn new(config: &DeviceConfig) -> Result<Self, TableError> {
-        let class_table = AttributeTable::new(Scope::Class, &config.attributes)?;
         let axis_table = AttributeTable::new(Scope::Instance, &config.attributes)?;
+        let facts = ClassFacts {
+            axes: config.axes.len(),
+            axis_table: &axis_table,
+            supports_sync: config.supports_sync,
+            sync_threshold: config.sync_threshold,
+        };
+        let class_table = AttributeTable::new(Scope::Class, &class::complete(&config.attributes, &facts))?;
         let class = Class { store: AttributeStore::new(&class_table), service: ServiceChannel::default() };
         let slots = config.axes.iter().map(|axis| Slot::new(*axis, &axis_table)).collect();
         Ok(Self { class_table, axis_table, class, slots, tickets: 0 })
@@ -121,6 +128,12 @@ impl Instances {
     /// An attribute of the class as a number without sign.
     pub fn class_value(&self, id: u16) -> u64 {
         self.class.store.unsigned(&self.class_table, id).unwrap_or(0)
+    }
+
+    /// Largest variation of a synchronized clock that the controller accepts (class attribute 29), ns; `None` where the clock is
+    /// not measured.
+    pub fn sync_threshold(&self) -> Option<u64> {
+        self.class.store.unsigned(&self.class_table, id::SYNC_THRESHOLD)
     }
 
     pub fn publish_class(&mut self, values: &[(u16, u64)]) {

@@ -104,6 +104,13 @@ impl NodeHealth {
         }
     }
 
+    /// The variation of system time is beyond the threshold, in synchronous operation. An alarm that says more stands.
+    pub fn jitter(&mut self, now: MonotonicTime) {
+        if matches!(self.alarm, NodeAlarm::NONE | NodeAlarm::CLOCK_JITTER) {
+            self.post(NodeAlarm::CLOCK_JITTER, now);
+        }
+    }
+
     /// Lets alarms run out.
     pub fn tick(&mut self, now: MonotonicTime) {
         if now.0.saturating_sub(self.alarm_since.0) > ALARM_NS {

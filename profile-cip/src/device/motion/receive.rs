@@ -11,7 +11,7 @@ use crate::device::attribute::id;
 use crate::device::axis::UpdateTimes;
 use crate::wire::motion::codes::{MotionService, NodeAlarm, NodeControl, NodeFault};
 use crate::wire::motion::fixed::FixedCommand;
-use crate::wire::motion::{CommandFrame, CommandHeader, CommandInstance, Format};
+use crate::wire::motion::{CommandFrame, CommandHeader, CommandInstance, Format, run_idle};
 use crate::wire::status::GeneralStatus;
 
 /// An update whose form is right.
@@ -83,8 +83,8 @@ impl Engine {
                 connection.heard(Some(sequence), now);
                 true
             }
-            Packet::New => self.check(update).is_some_and(|checked| {
-                self.handle_update((now, arrival), system_time, Some(sequence), &checked);
+            Packet::New => self.check(update).is_some_and(|(run, checked)| {
+                self.handle_update((now, arrival), system_time, Some(sequence), run, &checked);
                 true
             }),
         };
@@ -102,21 +102,25 @@ impl Engine {
         if update.len() + SEQUENCE_LEN > usize::from(connection.parameters.o_to_t_size) {
             self.statistics.counters.oversize += 1;
             self.node.raise(NodeFault::DATA_FORMAT);
-        } else if let Some(checked) = self.check(update) {
-            self.handle_update((now, now), system_time, None, &checked);
+        } else if let Some((run, checked)) = self.check(update) {
+            self.handle_update((now, now), system_time, None, run, &checked);
         }
         self.step(system_time);
     }
 
-    /// Checks the form of a whole update. A wrong one is counted and raises node fault 4; nothing else changes.
+    /// Checks the form of a whole update, and says whether it runs. A wrong one is counted and raises node fault 4; nothing else changes.
     ///
     /// The other format is a wrong form as well: the format of a connection does not change (clause 6-2.7.1.1).
-    fn check<'p>(&mut self, update: &'p [u8]) -> Option<Checked<'p>> {
-        let parsed = match self.config.format {
-            Format::Variable => CommandFrame::parse(update).map(Checked::Variable),
-            Format::Fixed => FixedCommand::parse(update).map(Checked::Fixed),
-        };
-        let checked = match parsed {
+    fn check<'p>(&mut self, update: &'p [u8]) -> Option<(bool, Checked<'p>)> {
+        let revision = self.connection.as_ref()?.parameters.format_revision;
+        let parsed = run_idle::split(revision, update).and_then(|(run, update)| {
+            let checked = match self.config.format {
+                Format::Variable => CommandFrame::parse_as(update, revision).map(Checked::Variable),
+                Format::Fixed => FixedCommand::parse(update).map(Checked::Fixed),
+            };
+            checked.map(|checked| (run, checked))
+        });
+        let (run, checked) = match parsed {
             Ok(checked) => checked,
             Err(error) => {
                 self.statistics.malformed(error);
@@ -127,7 +131,7 @@ impl Engine {
         match checked.is_known_and_finite(self.instances.axis_count()) {
             (false, _) => self.statistics.counters.unknown_instance += 1,
             (true, false) => self.statistics.counters.not_finite += 1,
-            (true, true) => return Some(checked),
+            (true, true) => return Some((run, checked)),
         }
         self.node.raise(NodeFault::DATA_FORMAT);
         None
@@ -140,9 +144,14 @@ impl Engine {
         (now, arrival): (MonotonicTime, MonotonicTime),
         system_time: Option<SystemTime>,
         sequence: Option<u16>,
+        run: bool,
         checked: &Checked<'_>,
     ) {
-        let header = checked.header();
+        let mut header = checked.header();
+        // An originator that is idle says that its data mean nothing, whatever they are.
+        if !run {
+            header.node_control -= NodeControl::DATA_VALID;
+        }
         let Some(connection) = &mut self.connection else { return };
         let before = connection.node_control();
         if !header.node_control.contains(NodeControl::DATA_VALID) {

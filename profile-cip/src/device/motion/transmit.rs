@@ -13,7 +13,7 @@ use crate::wire::motion::codes::{NodeControl, NodeStatus, TimeDataSet};
 use crate::wire::motion::event::NOTIFICATION_LEN;
 use crate::wire::motion::{
     ActualBlock, ActualEvents, ActualHeader, ActualInstance, ActualWriter, Format, ReadBlock,
-    ServiceResponse, TimeDiagnostics,
+    ServiceResponse, TimeDiagnostics, run_idle,
 };
 use crate::wire::status::GeneralStatus;
 
@@ -93,8 +93,11 @@ impl Engine {
         out: &mut [u8],
     ) -> Option<usize> {
         let size = self.transmit_size()?.min(out.len());
-        let (sequence, update) = out.get_mut(..size)?.split_first_chunk_mut::<SEQUENCE_LEN>()?;
-        let len = self.produce(now, system_time, update)?;
+        let (sequence, data) = out.get_mut(..size)?.split_first_chunk_mut::<SEQUENCE_LEN>()?;
+        let revision = self.connection.as_ref()?.parameters.format_revision;
+        let head = run_idle::len(revision);
+        let len = head + self.produce(now, system_time, data.get_mut(head..)?)?;
+        run_idle::finish(revision, data);
         *sequence = self.connection.as_ref()?.schedule.sequence.to_le_bytes();
         Some(SEQUENCE_LEN + len)
     }

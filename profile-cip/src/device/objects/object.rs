@@ -144,7 +144,7 @@ fn get<T: Object>(
     Ok(())
 }
 
-fn all<T: Object>(object: &T, of_class: bool, data: &[u8]) -> Result<Vec<u8>, GeneralStatus> {
+pub(super) fn all<T: Object>(object: &T, of_class: bool, data: &[u8]) -> Result<Vec<u8>, GeneralStatus> {
     let attributes = if of_class { T::CLASS_ALL } else { T::ALL };
     if attributes.is_empty() {
         return Err(GeneralStatus::SERVICE_NOT_SUPPORTED);

@@ -8,6 +8,8 @@
 //! an opinion whether its time is everybody's time, and which clock that is. A follower of PTP serves all but the
 //! priorities of a master, which it can never be.
 //!
+//! Get_Attributes_All has all of them in their order, with zeros in place of those that are not served.
+//!
 //! | attribute | name | layout | served when |
 //! |---|---|---|---|
 //! | 1 | PTPEnable | BOOL | always; set to what it is, or refused |
@@ -64,6 +66,9 @@ const PARENT_VARIANCE: u16 = 0xFFFF;
 const PARENT_PHASE_CHANGE_RATE: u32 = 0x7FFF_FFFF;
 /// Highest domain (IEEE 1588-2008, table 2).
 const DOMAIN_MAX: u8 = 127;
+
+/// Octets of a [`ClockInfo`].
+const CLOCK_INFO_LEN: usize = 20;
 
 /// What a clock says of itself.
 ///
@@ -224,7 +229,9 @@ pub(crate) struct TimeSync<'a> {
 
 impl Object for TimeSync<'_> {
     const REVISION: u16 = 3;
-    const ALL: &'static [u16] = &[];
+    const ALL: &'static [u16] = &[
+        1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28,
+    ];
     const ATTRIBUTE_MAX: u16 = 28;
 
     // Flat: one arm per attribute.
@@ -314,6 +321,21 @@ impl Object for TimeSync<'_> {
             _ => return Err(NONE),
         }
         Ok(())
+    }
+
+    /// Zeros of the same size, so that what follows stands at its place; a list has no ports.
+    fn absent(&self, attribute: u16, out: &mut Vec<u8>) {
+        let len = match attribute {
+            16..=18 => 1,
+            14 | 15 | 19 | 24 | 25 | 27 => 2,
+            20 => 4,
+            3..=7 => 8,
+            9 | 28 => 16,
+            10 => CLOCK_INFO_LEN,
+            8 => CLOCK_INFO_LEN + 4,
+            _ => 0,
+        };
+        out.resize(out.len() + len, 0);
     }
 
     fn settable_len(&self, attribute: u16) -> Result<usize, GeneralStatus> {
@@ -583,6 +605,36 @@ mod tests {
             let status = TimeSyncState { ptp: Some(ptp), ..follower() };
             assert_eq!(value(&status, 12), Ok(port(&[code, 0])));
             assert_eq!(value(&status, 9), Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED), "no parent");
+        }
+    }
+
+    #[test]
+    fn all_attributes_stand_at_their_places_whether_they_are_served_or_not() {
+        const LENGTHS: [(u16, usize); 12] = [
+            (1, 1),
+            (2, 1),
+            (3, 8),
+            (4, 8),
+            (5, 8),
+            (6, 8),
+            (7, 8),
+            (8, 24),
+            (9, 16),
+            (10, 20),
+            (11, 2),
+            (12, 6),
+        ];
+        for state in [follower(), host(), TimeSyncState::default()] {
+            let config = device();
+            let now = MonotonicTime(5_000_001);
+            let object = TimeSync { state: &state, config: &config, now, setting: None };
+            let whole = super::super::object::all(&object, false, &[]).unwrap();
+            let mut at = 0;
+            for (attribute, len) in LENGTHS {
+                let expected = value(&state, attribute).unwrap_or_else(|_| vec![0; len]);
+                assert_eq!(whole[at..at + len], expected, "{attribute}");
+                at += len;
+            }
         }
     }
 

@@ -135,6 +135,7 @@ fn device(config: &MotionDriveConfig) -> Result<MotionDevice, DeviceError> {
         attributes: config.attributes.clone(),
         power_structure_class_id: 0,
         supports_sync: false,
+        sync_threshold: None,
         transmission_processing_ns: 0,
     })
 }

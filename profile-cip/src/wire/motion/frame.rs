@@ -9,7 +9,7 @@ use super::actual::ActualBlock;
 use super::codes::{NodeControl, NodeStatus};
 use super::cyclic::CommandBlock;
 use super::event::{ActualEvents, CommandEvents};
-use super::header::{ActualHeader, CommandHeader};
+use super::header::{ActualHeader, CommandHeader, FORMAT_REVISION};
 use super::instance::{Blocks, Sequence, Sizes};
 use super::read_write::{ReadBlock, WriteBlock};
 use super::service::{ServiceRequest, ServiceResponse};
@@ -139,6 +139,7 @@ macro_rules! frame {
         #[derive(Debug, Clone, Copy)]
         pub struct $frame<'a> {
             header: $header,
+            revision: u8,
             body: &'a [u8],
         }
 
@@ -151,11 +152,19 @@ macro_rules! frame {
             /// Format, revision, a size, a reserved code of unknown size, the order of the instance numbers, or
             /// octets missing or left over.
             pub fn parse(update: &'a [u8]) -> Result<Self, Error> {
+                Self::parse_as(update, FORMAT_REVISION)
+            }
+
+            /// The same of a connection of this format revision.
+            ///
+            /// # Errors
+            /// As [`Self::parse`].
+            pub fn parse_as(update: &'a [u8], revision: u8) -> Result<Self, Error> {
                 let mut reader = Reader::new(update);
-                let header = $header::parse(&mut reader)?;
+                let header = $header::parse(&mut reader, revision)?;
                 let valid: fn(&$header) -> bool = $valid;
                 if !valid(&header) {
-                    return Ok(Self { header, body: &[] });
+                    return Ok(Self { header, revision, body: &[] });
                 }
                 let checked = reader.clone();
                 let mut sequence = Sequence::default();
@@ -166,7 +175,7 @@ macro_rules! frame {
                     $instance::check(blocks)?;
                 }
                 reader.finish("instance data blocks")?;
-                Ok(Self { header, body: checked.clone().rest() })
+                Ok(Self { header, revision, body: checked.clone().rest() })
             }
 
             /// The header.
@@ -202,7 +211,7 @@ macro_rules! frame {
 
         impl fmt::Display for $frame<'_> {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                self.header.fmt(f)?;
+                self.header.describe(self.revision, f)?;
                 self.instances().try_for_each(|instance| instance.fmt(f))
             }
         }

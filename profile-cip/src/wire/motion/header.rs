@@ -25,13 +25,17 @@ use crate::wire::{Error, Reader, Writer};
 
 mod field {
     pub const FORMAT: usize = 0;
-    pub const REVISION: usize = FORMAT + 1;
+    pub const REVISION: usize = super::REVISION_AT;
     pub const TIME_DATA_SET: usize = 7;
     pub const FIXED_END: usize = 8;
 }
 
 /// Format Revision of this edition of the connection, clause 6-2.7.1.1. It equals the connection point.
 pub const FORMAT_REVISION: u8 = 2;
+/// Format Revision of a later edition, as Wireshark knows it: the same, behind a [run/idle header](super::run_idle).
+pub const FORMAT_REVISION_RUN_IDLE: u8 = 3;
+/// Place of the Format Revision in an update.
+pub const REVISION_AT: usize = 1;
 /// Octets of a header without time data.
 pub const HEADER_LEN: usize = field::FIXED_END;
 const HEADER: &str = "connection header";
@@ -112,24 +116,24 @@ fn parse_time_data_set(reader: &mut Reader<'_>) -> Result<TimeDataSet, Error> {
     }
 }
 
-fn expect_format(reader: &mut Reader<'_>, format: ConnectionFormat) -> Result<(), Error> {
-    let (found, revision) = (reader.u8(HEADER)?, reader.u8(HEADER)?);
+fn expect_format(reader: &mut Reader<'_>, format: ConnectionFormat, revision: u8) -> Result<(), Error> {
+    let (found, found_revision) = (reader.u8(HEADER)?, reader.u8(HEADER)?);
     if found != format.0 {
         return Err(invalid("connection format", field::FORMAT, found, format.0));
     }
-    if revision != FORMAT_REVISION {
-        return Err(invalid("format revision", field::REVISION, revision, FORMAT_REVISION));
+    if found_revision != revision {
+        return Err(invalid("format revision", field::REVISION, found_revision, revision));
     }
     Ok(())
 }
 
 impl CommandHeader {
-    /// Reads a header and leaves `reader` at the first instance data block.
+    /// Reads a header of this format revision and leaves `reader` at the first instance data block.
     ///
     /// # Errors
-    /// The octets are too few, or format, revision or time data set are not those of this edition.
-    pub fn parse(reader: &mut Reader<'_>) -> Result<Self, Error> {
-        expect_format(reader, ConnectionFormat::VARIABLE_COMMAND)?;
+    /// The octets are too few, or format, revision or time data set are not those that are known.
+    pub fn parse(reader: &mut Reader<'_>, revision: u8) -> Result<Self, Error> {
+        expect_format(reader, ConnectionFormat::VARIABLE_COMMAND, revision)?;
         let update_id = reader.u8(HEADER)?;
         let node_control = NodeControl::from_bits_retain(reader.u8(HEADER)?);
         let instance_count = reader.u8(HEADER)?;
@@ -181,13 +185,13 @@ impl CommandHeader {
 }
 
 impl ActualHeader {
-    /// Reads a header and leaves `reader` at the first instance data block.
+    /// Reads a header of this format revision and leaves `reader` at the first instance data block.
     ///
     /// # Errors
-    /// The octets are too few, or format, revision or time data set are not those of this edition.
+    /// The octets are too few, or format, revision or time data set are not those that are known.
     // Flat: one line per field, each with its error.
-    pub fn parse(reader: &mut Reader<'_>) -> Result<Self, Error> {
-        expect_format(reader, ConnectionFormat::VARIABLE_ACTUAL)?;
+    pub fn parse(reader: &mut Reader<'_>, revision: u8) -> Result<Self, Error> {
+        expect_format(reader, ConnectionFormat::VARIABLE_ACTUAL, revision)?;
         let update_id = reader.u8(HEADER)?;
         let node_status = NodeStatus::from_bits_retain(reader.u8(HEADER)?);
         let instance_count = reader.u8(HEADER)?;
@@ -293,7 +297,14 @@ fn write_times(
 
 impl fmt::Display for CommandHeader {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "CIP Motion C-to-D, format revision {FORMAT_REVISION}, update {}", self.update_id)?;
+        self.describe(FORMAT_REVISION, f)
+    }
+}
+
+impl CommandHeader {
+    /// Writes the header of an update with this format revision as lines of text.
+    pub(super) fn describe(&self, revision: u8, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "CIP Motion C-to-D, format revision {revision}, update {}", self.update_id)?;
         writeln!(f, "  Node Control: {}", self.node_control)?;
         writeln!(f, "  Instance Count: {}", self.instance_count)?;
         writeln!(f, "  Last Received ID: {}", self.last_received_id)?;
@@ -304,7 +315,14 @@ impl fmt::Display for CommandHeader {
 
 impl fmt::Display for ActualHeader {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "CIP Motion D-to-C, format revision {FORMAT_REVISION}, update {}", self.update_id)?;
+        self.describe(FORMAT_REVISION, f)
+    }
+}
+
+impl ActualHeader {
+    /// Writes the header of an update with this format revision as lines of text.
+    pub(super) fn describe(&self, revision: u8, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "CIP Motion D-to-C, format revision {revision}, update {}", self.update_id)?;
         writeln!(f, "  Node Status: {}", self.node_status)?;
         writeln!(f, "  Instance Count: {}", self.instance_count)?;
         writeln!(f, "  Node Fault: {}", self.node_fault)?;

@@ -19,6 +19,7 @@ pub mod header;
 pub mod id_list;
 mod instance;
 pub mod read_write;
+pub mod run_idle;
 pub mod service;
 pub mod test_service;
 mod value;
@@ -28,7 +29,10 @@ pub use cyclic::{CommandBlock, CommandPosition, CommandValues};
 pub use event::{ActualEvents, CommandEvents, EventAck, EventNotification};
 pub use fixed::Format;
 pub use frame::{ActualFrame, ActualInstance, ActualWriter, CommandFrame, CommandInstance, CommandWriter};
-pub use header::{ActualHeader, CommandHeader, FORMAT_REVISION, TimeDiagnostics, UpdateDiagnostics};
+pub use header::{
+    ActualHeader, CommandHeader, FORMAT_REVISION, FORMAT_REVISION_RUN_IDLE, TimeDiagnostics,
+    UpdateDiagnostics,
+};
 pub use read_write::{ReadBlock, WriteBlock};
 pub use service::{ServiceRequest, ServiceResponse};
 

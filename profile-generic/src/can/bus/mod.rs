@@ -22,7 +22,6 @@ mod station;
 mod tests;
 mod violation;
 
-use std::cell::Cell;
 use std::collections::VecDeque;
 
 pub use self::disturbance::{DISTURBANCES_MAX, Disturbance, Effect};
@@ -31,7 +30,7 @@ pub use self::station::{State, Statistics};
 use self::violation::Checker;
 pub use self::violation::{Rule, VIOLATIONS_MAX, Violation};
 use super::frame::{Frame, Id};
-use super::timing::{BitRate, Bits, ERROR_FRAME_BITS, RECOVERY_BITS, exact};
+use super::timing::{BitRate, ERROR_FRAME_BITS, RECOVERY_BITS, exact};
 use crate::time::{DurationNs, MonotonicTime};
 
 /// Stations that a bus has at most; more than its 127 node numbers and a few listeners.
@@ -171,8 +170,6 @@ pub struct Bus {
     disturbances: disturbance::List,
     checker: Checker,
     restart: Option<DurationNs>,
-    /// The frame whose bits were counted last: it is asked for again and again while it waits.
-    counted: Cell<Option<(Frame, Bits)>>,
 }
 
 impl Bus {
@@ -190,16 +187,7 @@ impl Bus {
             disturbances: disturbance::List::default(),
             checker: Checker::default(),
             restart: None,
-            counted: Cell::new(None),
         }
-    }
-
-    /// How long a frame takes.
-    fn time_of(&self, frame: &Frame) -> DurationNs {
-        let counted = self.counted.get().filter(|(known, _)| known == frame);
-        let (_, bits) = counted.unwrap_or_else(|| (*frame, exact(frame)));
-        self.counted.set(Some((*frame, bits)));
-        self.rate.time(bits)
     }
 
     /// Adds a station whose queue holds `queue` frames; `None` beyond [`STATIONS_MAX`]. The only call that allocates.
@@ -289,7 +277,7 @@ impl Bus {
             card.statistics.refused += 1;
             return refused;
         }
-        card.push(Waiting { since: now, frame: *frame });
+        card.push(Waiting { since: now, frame: *frame, time: self.rate.time(exact(frame)) });
         self.checker.sent(now, station, frame);
         Ok(())
     }
@@ -318,7 +306,7 @@ impl Bus {
             Some(carried) => Some(carried.end),
             None => self.next_start().and_then(|start| {
                 let (winner, ..) = self.arbitrate(start)?;
-                Some(start + self.time_of(&winner))
+                Some(start + winner.time)
             }),
         };
         let cards = self.cards.iter().filter_map(Card::wake_at);
@@ -442,7 +430,7 @@ impl Bus {
 
     /// The frame that wins the bus at `start`, all that send its very bits, and the first that sends other bits behind the same
     /// identifier.
-    fn arbitrate(&self, start: MonotonicTime) -> Option<(Frame, Senders, Option<usize>)> {
+    fn arbitrate(&self, start: MonotonicTime) -> Option<(&Waiting, Senders, Option<usize>)> {
         let candidates = self.cards.iter().enumerate();
         let candidates = candidates.filter_map(|(place, card)| Some((place, card.head(start)?)));
         let (_, winner) = candidates.clone().min_by_key(|(_, waiting)| precedence(&waiting.frame))?;
@@ -455,16 +443,15 @@ impl Bus {
                 }
             }
         }
-        Some((winner.frame, senders, rival))
+        Some((winner, senders, rival))
     }
 
     /// Puts the next frame on the wire at `start`. A station that is alone tries again and again until `now`.
     fn begin(&mut self, start: MonotonicTime, now: MonotonicTime) {
-        let Some((frame, senders, rival)) = self.arbitrate(start) else { return };
+        let Some((&Waiting { frame, mut time, .. }, senders, rival)) = self.arbitrate(start) else { return };
         let listens = |place: usize| self.cards[place].listens() && !senders.has(place);
         let heard = (0..self.cards.len()).any(listens) || rival.is_some();
         let first = self.stations().find(|station| senders.has(station.index()));
-        let mut time = self.time_of(&frame);
         let fate = if let (Some(rival), Some(station)) = (rival, first) {
             let rule =
                 Rule::Collision { with: Station(u8::try_from(rival).unwrap_or(u8::MAX)), id: frame.id() };

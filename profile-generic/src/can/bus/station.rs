@@ -59,6 +59,8 @@ pub(super) struct Waiting {
     pub since: MonotonicTime,
     /// The frame.
     pub frame: Frame,
+    /// How long it takes on the wire. Counted once: it is asked for again and again while the frame waits.
+    pub time: DurationNs,
 }
 
 /// A frame that is held back from a receiver.
@@ -128,8 +130,8 @@ impl Card {
     }
 
     /// What it has to send at `start`.
-    pub fn head(&self, start: MonotonicTime) -> Option<Waiting> {
-        self.queue.front().copied().filter(|waiting| waiting.since <= start)
+    pub fn head(&self, start: MonotonicTime) -> Option<&Waiting> {
+        self.queue.front().filter(|waiting| waiting.since <= start)
     }
 
     /// Its first frame, which began at `start`, has gone out; gives how long it had waited.

@@ -156,13 +156,18 @@ fn paths_and_blocks_that_are_refused() {
             (1, 0x12F),
         ),
         (
-            "format revision 3",
-            &[0x20, 0x42, 0x2C, 0x51, 0x2C, 3, 0x80, 4, 1, 0, 0, 0, 0, 0, 0, 0],
+            "format revision 4",
+            &[0x20, 0x42, 0x2C, 0x51, 0x2C, 4, 0x80, 4, 1, 0, 0, 0, 0, 0, 0, 0],
             (1, 0x12F),
         ),
         (
             "configuration 0x53",
             &[0x20, 0x42, 0x2C, 0x53, 0x2C, 2, 0x80, 4, 3, 0, 0, 0, 0, 0, 0, 0],
+            (1, 0x12F),
+        ),
+        (
+            "two format revisions",
+            &[0x20, 0x42, 0x2C, 0x51, 0x2C, 3, 0x2C, 2, 0x80, 4, 1, 0, 0, 0, 0, 0, 0, 0],
             (1, 0x12F),
         ),
         ("four points", &[0x20, 0x42, 0x2C, 0x51, 0x2C, 2, 0x2C, 2, 0x2C, 2], (1, 0x12F)),

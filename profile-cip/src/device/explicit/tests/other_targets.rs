@@ -30,6 +30,7 @@ impl Whole {
             attributes: Vec::new(),
             power_structure_class_id: 0x0A0B_0C0D,
             supports_sync: true,
+            sync_threshold: None,
             transmission_processing_ns: 100_000,
         };
         Self { rig: Rig::new(), device: MotionDevice::new(config).unwrap() }

@@ -37,7 +37,13 @@ fn the_time_sync_object_answers_as_the_device_was_told() {
     assert_eq!(rig.ask(client, &set(1)).outcome(), (0x09, 0));
     assert_eq!(rig.get(client, TIME_SYNC, 1).data, [0]);
     let all = message(Service::GET_ATTRIBUTES_ALL, TIME_SYNC, &[]);
-    assert_eq!(rig.ask(client, &all).outcome(), (0x08, 0), "the object has no such service");
+    let all = rig.ask(client, &all);
+    assert_eq!((all.outcome(), &all.data[..2]), ((0, 0), &[0, 1][..]), "PTP off, synchronized");
+    assert_eq!(
+        all.data[2 + 16 + 24..][..8],
+        [7; 8],
+        "the grandmaster behind offsets and delay that nobody measures"
+    );
     assert_eq!(rig.get(client, &[0x20, 0x43], 1).data, [3, 0]);
 }
 

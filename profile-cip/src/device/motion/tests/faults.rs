@@ -143,7 +143,7 @@ fn ruled() -> Rig {
             8 => (1, 0.0, 3.0),
             _ => (255, 255.0, 255.0),
         };
-        ElementRule { default: DefaultValue::Integer(default), range: (low, high) }
+        ElementRule { default: DefaultValue::Integer(default), range: (low, high), keeps: Some(255) }
     };
     let mut definitions = definitions();
     let array = definitions.iter_mut().find(|row| row.id == 672).expect("the array");
@@ -182,7 +182,8 @@ fn an_action_that_an_exception_does_not_have_is_refused_at_its_place() {
     assert_eq!(set_elements(&mut rig, 2, 33, &[2]), (0x09, 33), "the drive is off: nothing less than major");
     assert_eq!(set_elements(&mut rig, 3, 9, &[0]), (0x09, 9), "unsupported stays unsupported");
     assert_eq!(set_elements(&mut rig, 4, 9, &[255]), (0, 0));
-    assert_eq!(set_elements(&mut rig, 5, 54, &[255]), (0x09, 54), "supported stays supported");
+    assert_eq!(set_elements(&mut rig, 5, 54, &[255]), (0, 0), "a controller that does not know it");
+    assert_eq!(get_array(&mut rig)[54], 0, "leaves it as it is");
     assert_eq!(set_elements(&mut rig, 6, 54, &[4]), (0x09, 54), "reserved");
     assert_eq!(set_elements(&mut rig, 7, 53, &[255, 1, 255, 3]), (0x09, 56), "nothing of it is taken");
     let mut expected = defaults.clone();
@@ -190,6 +191,13 @@ fn an_action_that_an_exception_does_not_have_is_refused_at_its_place() {
     assert_eq!(get_array(&mut rig), expected);
     assert_eq!(set_elements(&mut rig, 8, 0, &defaults), (0, 0), "the whole array, as it was");
     assert_eq!(get_array(&mut rig), defaults);
+    // The array of a controller that knows two of the exceptions.
+    let mut few = vec![255; 64];
+    (few[8], few[54]) = (0, 1);
+    assert_eq!(set_elements(&mut rig, 10, 0, &few), (0, 0));
+    let mut expected = defaults.clone();
+    (expected[8], expected[54]) = (0, 1);
+    assert_eq!(get_array(&mut rig), expected);
     // A new connection begins with the defaults again.
     set_elements(&mut rig, 9, 8, &[3]);
     rig.services[1] = None;

@@ -36,6 +36,7 @@ fn config() -> DeviceConfig {
         attributes: definitions(),
         power_structure_class_id: 0,
         supports_sync: false,
+        sync_threshold: None,
         transmission_processing_ns: 0,
     }
 }

@@ -129,6 +129,7 @@ pub(crate) struct Rig {
 /// The exceptions that an axis finds itself stop it, as long as the controller says nothing else; others are ignored.
 fn exception_rules() -> Vec<ElementRule> {
     let rule = |code| ElementRule {
+        keeps: None,
         default: DefaultValue::Integer(if matches!(code, 60 | 62) { 3 } else { 0 }),
         range: (0.0, 255.0),
     };
@@ -164,8 +165,21 @@ impl Rig {
         Self::processing(100_000, attributes)
     }
 
+    /// A device with these attributes whose clock measures how well it is synchronized.
+    pub fn measuring(sync_threshold: u32, attributes: Vec<AttributeDefinition>) -> Self {
+        Self::of(100_000, Some(sync_threshold), attributes)
+    }
+
     /// A device with these attributes and this Transmission Processing Time, ns.
     pub fn processing(transmission_processing_ns: u64, attributes: Vec<AttributeDefinition>) -> Self {
+        Self::of(transmission_processing_ns, None, attributes)
+    }
+
+    fn of(
+        transmission_processing_ns: u64,
+        sync_threshold: Option<u32>,
+        attributes: Vec<AttributeDefinition>,
+    ) -> Self {
         let axis = AxisConfig {
             kind: ControlKind::Active,
             control_modes: 1 << ControlMode::POSITION.0 | 1 << ControlMode::VELOCITY.0,
@@ -179,6 +193,7 @@ impl Rig {
             attributes,
             power_structure_class_id: 0x1234,
             supports_sync: true,
+            sync_threshold,
             transmission_processing_ns,
         };
         let mut device = MotionDevice::new(config).expect("a device");

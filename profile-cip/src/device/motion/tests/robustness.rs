@@ -153,6 +153,7 @@ fn a_feedback_axis_runs_without_being_enabled_and_never_energizes() {
         attributes: Vec::new(),
         power_structure_class_id: 0,
         supports_sync: false,
+        sync_threshold: None,
         transmission_processing_ns: 0,
     };
     rig.device = MotionDevice::new(config).expect("a device");

@@ -162,7 +162,7 @@ fn the_connection_belongs_to_one_owner_and_needs_good_parameters() {
             other => panic!("{other:?}"),
         }
     };
-    assert_eq!(refused(&|p| p.format_revision = 3), 0x012F);
+    assert_eq!(refused(&|p| p.format_revision = 4), 0x012F);
     assert_eq!(refused(&|p| p.rpi_us = 0), 0x0111);
 }
 

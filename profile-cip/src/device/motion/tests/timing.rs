@@ -1,8 +1,10 @@
 //! Lost and late updates, asynchronous and synchronous production.
 
 use super::*;
+use crate::device::attribute::id;
 use crate::device::axis::drive_link::{DriveAction, Withheld};
 use crate::device::axis::state::AxisState;
+use crate::device::motion_link::SyncQuality;
 use crate::wire::motion::UpdateDiagnostics;
 use crate::wire::motion::codes::{NodeAlarm, NodeFault, NodeStatus};
 
@@ -655,4 +657,93 @@ fn a_lost_drive_reports_no_velocity() {
     rig.drives[0].image.online = false;
     rig.cycles(2);
     assert_eq!(rig.actual(0).actual.velocity, None);
+}
+
+/// A running rig in synchronous operation, whose clock measures how well it is synchronized.
+fn measuring() -> Rig {
+    let class = |id, data_type, access| AttributeDefinition::new(Scope::Class, id, data_type, access, "");
+    let mut attributes = definitions();
+    attributes.extend([
+        class(id::SYNC_VARIANCE, DataType::Udint, Access::Get),
+        class(id::SYNC_THRESHOLD, DataType::Udint, Access::Set),
+        class(id::SYNC_UPDATE_DELAY, DataType::Real, Access::Get),
+    ]);
+    let mut rig = Rig::measuring(10_000, attributes);
+    rig.open();
+    rig.request_all(AxisControl::ENABLE);
+    rig.time = TimeDataSet::TIME_STAMP | TimeDataSet::UPDATE_DIAGNOSTICS;
+    rig.control |= NodeControl::SYNC_CONTROL;
+    rig.cycles(10);
+    assert!(rig.device.is_synchronous());
+    rig
+}
+
+#[test]
+fn variation_beyond_the_threshold_of_the_controller_is_an_alarm_while_synchronous() {
+    let mut rig = measuring();
+    let quality = SyncQuality { variance: 20_000, steps_removed: 3, log_sync_interval: -1 };
+    rig.device.set_sync_quality(SyncQuality { variance: 9_000, ..quality });
+    rig.cycles(10_000_000_000 / usize::try_from(PERIOD).expect("a period") + 10);
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::NONE);
+    rig.device.set_sync_quality(quality);
+    rig.cycle();
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::CLOCK_JITTER);
+    let read = |rig: &Rig, id| rig.device.engine.instances.class_value(id);
+    rig.device.engine.publish(0);
+    assert_eq!(read(&rig, id::SYNC_VARIANCE), 20_000);
+    assert_eq!(read(&rig, id::SYNC_UPDATE_DELAY), u64::from(1.5_f32.to_bits()), "3 steps of half a second");
+
+    // A controller that takes more: the source of the time goes by it, and so does the alarm.
+    assert_eq!(rig.device.sync_threshold(), Some(10_000));
+    rig.device.engine.instances.publish_class(&[(id::SYNC_THRESHOLD, 30_000)]);
+    assert_eq!(rig.device.sync_threshold(), Some(30_000));
+    rig.cycles(10_000_000_000 / usize::try_from(PERIOD).expect("a period") + 10);
+    assert_eq!(rig.device.node_alarm(), NodeAlarm::NONE, "ten seconds after its cause");
+
+    // It counts as long as the connection.
+    rig.close();
+    assert_eq!(rig.device.sync_threshold(), None);
+    rig.packet.clear();
+    rig.open();
+    assert_eq!(rig.device.sync_threshold(), Some(10_000));
+}
+
+/// Connection point 3: a run/idle header in front of each update, both ways, and its revision in it.
+#[test]
+fn updates_of_format_revision_3_run_or_are_idle() {
+    let mut rig = Rig::new();
+    let parameters = OpenParameters { format_revision: 3, ..rig.open_parameters() };
+    let reply = rig.request(MotionRequest::Open(parameters));
+    assert_eq!(reply, Some(MotionReply::Opened { token: parameters.token, outcome: Ok(()) }));
+    rig.configure();
+    // What the rig writes, as such a controller would.
+    let send = |rig: &mut Rig, header: [u8; 4], revision: u8| -> NodeStatus {
+        rig.now += PERIOD;
+        let command = CommandHeader { last_received_id: 0, ..rig.command_header() };
+        rig.sequence += 1;
+        rig.update_id += 1;
+        let packet = rig.packet_with(&CommandHeader { update_id: rig.update_id, ..command });
+        let mut data = [&packet[..2], &header, &packet[2..]].concat();
+        data[2 + 4 + 1] = revision;
+        rig.send(&data);
+        assert!(rig.run_device(), "an update goes out in each period");
+        let sent = std::mem::take(&mut rig.packet);
+        assert_eq!((&sent[2..6], &sent[6..8]), (&[1, 0, 0, 0][..], &[7, 3][..]), "{sent:?}");
+        let frame = ActualFrame::parse_as(&sent[6..], 3).expect("an update");
+        // The rig reads updates of revision 2.
+        rig.packet = [&sent[..2], &[7, 2], &sent[8..]].concat();
+        frame.header().node_status
+    };
+    let run = |rig: &mut Rig, header| (0..20).map(|_| send(rig, header, 3)).last().expect("20 periods");
+    assert!(run(&mut rig, [1, 0, 0, 0]).contains(NodeStatus::DATA_VALID));
+    rig.request_all(AxisControl::ENABLE);
+    run(&mut rig, [1, 0, 0, 0]);
+    assert_eq!(rig.state(0), AxisState::Running);
+    // An idle originator: its data mean nothing, and the axes stop as without data.
+    assert!(!run(&mut rig, [0, 0, 0, 0]).contains(NodeStatus::DATA_VALID));
+    assert_ne!(rig.state(0), AxisState::Running);
+    // The revision of another connection point is a wrong form.
+    assert_eq!(rig.device.counters().malformed, 0);
+    send(&mut rig, [1, 0, 0, 0], 2);
+    assert_eq!(rig.device.counters().malformed, 1);
 }
