@@ -6,10 +6,12 @@ use profile_cip::device::axis_object::PositionView;
 use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{Conversion, Width};
+use profile_generic::ratio::Ratio;
 
 use super::cip_scaling::CipScaling;
 use super::cip_tables::{CipTables, Missing, Served, ServedAttribute, limit_has_sign};
 use super::dictionary::{Access, CipType, PolarityEffect};
+use super::mechanics::MechanicalFact;
 
 /// How far apart two values may be that are the same, of the larger one.
 const SAME: f64 = 0.001;
@@ -43,6 +45,8 @@ pub enum Backing {
     Stored,
     /// It never changes.
     Constant(i64),
+    /// It is what the scaling of the drive comes to.
+    Mechanics(MechanicalFact),
     /// A value of the process image.
     Signal {
         /// The signal.
@@ -60,6 +64,8 @@ pub enum Backing {
         from_generic: Conversion,
         /// What it is of a drive without the parameter.
         missing: Missing,
+        /// The attribute is one over the generic value; 0 on both sides is "none".
+        reciprocal: bool,
     },
 }
 
@@ -175,6 +181,7 @@ fn entry(
         Served::Connection => Backing::Connection,
         Served::Stored => Backing::Stored,
         Served::Constant(value) => Backing::Constant(value),
+        Served::Mechanics(fact) => Backing::Mechanics(fact),
         Served::Signal { signal, unit } => {
             let to_generic = scaling.convert(unit, turns)?;
             Backing::Signal { signal, from_generic: Conversion::new(to_generic.inverse()?) }
@@ -187,6 +194,7 @@ fn entry(
                 to_generic: Conversion::new(to_generic).within(low, high),
                 from_generic: Conversion::new(to_generic.inverse()?),
                 missing,
+                reciprocal: unit.reciprocal,
             }
         }
     };
@@ -209,9 +217,12 @@ impl AttributeEntry {
     /// The bytes do not hold a value of the type, or the value is out of range, or no parameter stands
     /// behind it.
     pub fn to_generic(&self, bytes: &[u8]) -> Result<i64, ValueError> {
-        let Backing::Parameter { to_generic, .. } = &self.backing else {
+        let Backing::Parameter { to_generic, reciprocal, .. } = &self.backing else {
             return Err(ValueError::NotConvertible);
         };
+        if *reciprocal {
+            return self.reciprocal_to_generic(to_generic, bytes);
+        }
         let width = self.number_width()?;
         let length = ValueError::Length { expected: width.bytes(), got: bytes.len() };
         let integer = width.integer(bytes).ok_or(length)?;
@@ -229,6 +240,28 @@ impl AttributeEntry {
         if outcome.saturated { Err(ValueError::Range) } else { Ok(outcome.value) }
     }
 
+    /// One over a real value, as a time constant is of a bandwidth. 0 is "none" on both sides, so nothing else may come to it.
+    fn reciprocal_to_generic(&self, to_generic: &Conversion, bytes: &[u8]) -> Result<i64, ValueError> {
+        let value = match (self.number_width()?, bytes) {
+            (Width::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+            (Width::F32, _) => {
+                return Err(ValueError::Length { expected: Width::F32.bytes(), got: bytes.len() });
+            }
+            _ => return Err(ValueError::NotConvertible),
+        };
+        if !value.is_finite() {
+            return Err(ValueError::NotFinite);
+        }
+        if value == 0.0 {
+            return Ok(0);
+        }
+        let outcome = to_generic.convert_f64(value.recip()).ok_or(ValueError::Range)?;
+        if value < 0.0 || outcome.saturated || outcome.value == 0 {
+            return Err(ValueError::Range);
+        }
+        Ok(outcome.value)
+    }
+
     /// Writes a generic value as the attribute into `out` and returns the bytes that count and whether the
     /// value was clamped.
     ///
@@ -241,6 +274,20 @@ impl AttributeEntry {
         };
         let width = self.number_width()?;
         *out = [0; 8];
+        if let Backing::Parameter { reciprocal: true, to_generic, .. } = &self.backing {
+            let value = match (width, generic) {
+                (Width::F32, 0) => 0.0,
+                (Width::F32, _) => {
+                    let ratio = to_generic.ratio;
+                    let divisor = ratio.den().checked_mul(generic);
+                    let value = divisor.and_then(|divisor| Ratio::new(ratio.num(), divisor));
+                    value.ok_or(ValueError::Range)?.convert_to_f32(1).value
+                }
+                _ => return Err(ValueError::NotConvertible),
+            };
+            out[..4].copy_from_slice(&value.to_le_bytes());
+            return Ok((width.bytes(), false));
+        }
         let clamped = match width {
             Width::F32 => {
                 let (outcome, saturated) = from_generic.convert_to_f32(generic);
@@ -303,6 +350,34 @@ impl AttributeEntry {
         }
     }
 
+    /// Whether the attribute is one over the generic value.
+    #[must_use]
+    pub fn is_reciprocal(&self) -> bool {
+        matches!(self.backing, Backing::Parameter { reciprocal: true, .. })
+    }
+
+    /// Writes a number as the attribute into `out` and returns the bytes that count; `None` for one that the attribute cannot hold.
+    #[must_use]
+    pub fn write_number(&self, number: Number, out: &mut [u8; 8]) -> Option<usize> {
+        let width = self.number_width().ok()?;
+        *out = [0; 8];
+        match (width, number) {
+            (Width::F32, Number::Real(value)) => {
+                out[..4].copy_from_slice(&nearest_single(value).to_le_bytes());
+            }
+            (Width::F64, Number::Real(value)) => *out = value.to_le_bytes(),
+            (Width::F32 | Width::F64, _) | (_, Number::Real(_)) => return None,
+            (_, Number::Integer(value)) => {
+                let (low, high) = width.range();
+                if !(low..=high).contains(&value) {
+                    return None;
+                }
+                *out = value.to_le_bytes();
+            }
+        }
+        Some(width.bytes())
+    }
+
     /// The number that the bytes of the attribute are; `None` for an array, a string, and bytes that are too few.
     #[must_use]
     pub fn number(&self, bytes: &[u8]) -> Option<Number> {
@@ -319,4 +394,10 @@ impl AttributeEntry {
     fn number_width(&self) -> Result<Width, ValueError> {
         self.data_type.width().filter(|_| self.length.is_none()).ok_or(ValueError::NotConvertible)
     }
+}
+
+/// The nearest single; ties to even.
+#[expect(clippy::cast_possible_truncation, reason = "the nearest single is what is wanted")]
+const fn nearest_single(value: f64) -> f32 {
+    value as f32
 }

@@ -20,6 +20,9 @@ pub(super) fn definitions(mapping: &Mapping, table: &AttributeTable) -> Vec<Attr
         let row = dictionary.attribute_by_id(entry.id)?;
         let sets = |set: &&Enumeration| set.attributes.contains(&row.id);
         let mut definition = definition(Scope::Instance, row, dictionary, sets)?;
+        if let Some(served) = mapping.cip.attributes.iter().find(|served| served.attribute.id == entry.id) {
+            definition.codes.retain(|code| !served.without.contains(code));
+        }
         let narrowed = entry.range.map(|(low, high)| (cast::f64_from_i64(low), cast::f64_from_i64(high)));
         definition.range = narrowed.or(definition.range);
         definition.element_rules = match entry.id {
@@ -29,7 +32,7 @@ pub(super) fn definitions(mapping: &Mapping, table: &AttributeTable) -> Vec<Attr
         };
         definition.backing = match entry.backing {
             Backing::Signal { .. } => attribute::Backing::Signal,
-            Backing::Parameter { .. } => attribute::Backing::Drive,
+            Backing::Parameter { .. } | Backing::Mechanics(_) => attribute::Backing::Drive,
             Backing::Constant(value) => {
                 definition.default = DefaultValue::Integer(value);
                 attribute::Backing::Stored

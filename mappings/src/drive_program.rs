@@ -16,6 +16,7 @@ use profile_sercos::wire::idn::Idn;
 
 use super::capture_program::{CaptureProgram, Place};
 use super::item::Item;
+use super::mechanics::Mechanics;
 
 /// Operation modes of one axis: the slots S-0-0032..35 and S-0-0284..287.
 pub const MAX_MODES: usize = 8;
@@ -312,6 +313,8 @@ pub struct DriveProgram {
     pub(super) commands: ArrayVec<(Action, Item), { Action::ALL.len() }>,
     pub(super) captures: CaptureProgram,
     pub(super) parameters: Vec<ParameterEntry>,
+    /// What lies between its motor and its load, where that is known.
+    pub mechanics: Option<Mechanics>,
     pub(super) position_step: Option<i64>,
     pub(super) acknowledges: bool,
     /// Set-point and target of the position stand in one place of the telegram.
@@ -355,10 +358,25 @@ impl DriveProgram {
             commands: ArrayVec::new(),
             captures: CaptureProgram::default(),
             parameters: Vec::new(),
+            mechanics: None,
             position_step: None,
             acknowledges,
             shares_target: false,
         }
+    }
+
+    /// Whether the gateway can go by a parameter itself that the drive lacks. A limit of the torque takes a drive that reports its torque.
+    #[must_use]
+    pub fn can_go_by(&self, parameter: Parameter) -> bool {
+        let is_torque =
+            [Parameter::OVER_TORQUE_LIMIT, Parameter::OVER_TORQUE_LIMIT_TIME].contains(&parameter);
+        !is_torque || self.feedback.fields().any(|field| field.signal == Signal::TorqueActual)
+    }
+
+    /// Whether the gateway knows the loops of the drive by its profile: it has parameters.
+    #[must_use]
+    pub fn has_parameters(&self) -> bool {
+        !self.parameters.is_empty()
     }
 
     /// The values to the drive, each with what carries it.

@@ -94,6 +94,10 @@ pub(super) fn fixed_unit(resolver: &mut Resolver<'_>, row: &UnitRow) -> Option<F
         let message = "expected no `times` for a fixed unit";
         resolver.error(code::CONTRADICTION, times.span(), "times", message);
     }
+    if row.reciprocal {
+        let message = "expected no `reciprocal` for the unit of a drive";
+        resolver.error(code::CONTRADICTION, row.unit.span(), "reciprocal", message);
+    }
     let quantity = quantity(resolver, &row.quantity);
     let ratio = resolver.ratio("generic_per_unit", &row.generic_per_unit);
     let (unit, texts) = (row.unit.get_ref().clone(), row.texts.clone());

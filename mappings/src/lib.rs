@@ -81,6 +81,7 @@ mod groups;
 mod item;
 mod load;
 mod meaning;
+mod mechanics;
 mod numbers;
 mod origin;
 mod overlay;
@@ -138,6 +139,7 @@ pub use drive_program::{
 pub use drive_rows::Full;
 pub use item::{Attribute, Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
+pub use mechanics::{MechanicalFact, Mechanics};
 pub use numbers::{LostPrecision, RowNumbers};
 pub use origin::Origin;
 pub use overlay::{DrivesHead, OVERLAYS_MAX, Overlay, OverlayHead, Section, sections};

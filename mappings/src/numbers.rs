@@ -118,7 +118,10 @@ impl Mapping {
         }
         let Some(table) = self.attribute_table(scaling) else { return numbers };
         for entry in table.entries() {
-            let Backing::Parameter { parameter, to_generic, .. } = entry.backing else { continue };
+            // The step of a reciprocal differs from value to value.
+            let Backing::Parameter { parameter, to_generic, reciprocal: false, .. } = entry.backing else {
+                continue;
+            };
             let Some(row) = program.parameter(parameter) else { continue };
             // A floating point number in the drive has neither counts nor ends that matter.
             if row.width.is_float() {

@@ -95,6 +95,10 @@ impl Mapping {
             Backing::Connection => (Truth::Computed, "the motion connection".to_owned()),
             Backing::Stored => (Truth::Stored, String::new()),
             Backing::Constant(value) => (Truth::Compared, format!("always {value}")),
+            Backing::Mechanics(fact) => match drive.mechanics.and_then(|mechanics| mechanics.value(fact)) {
+                Some(value) => (Truth::Compared, format!("{value} by the scaling of the drive")),
+                None => (Truth::Absent, "the drive does not show it".to_owned()),
+            },
             Backing::Signal { signal, .. } => (Truth::Live, signal.to_string()),
             Backing::Parameter { parameter, missing, .. } => self.truth_of(parameter, missing, is_set, drive),
         }
@@ -118,6 +122,13 @@ impl Mapping {
             (Some(held), _) => (Truth::Live, held.item.to_string()),
             (None, Missing::Absent) => (Truth::Absent, format!("the drive has no {name}")),
             (None, Missing::Stored) => (Truth::Stored, format!("the drive has no {name}")),
+            (None, Missing::Zero) if drive.has_parameters() => {
+                (Truth::Compared, format!("0: the drive has no {name}"))
+            }
+            (None, Missing::Zero) => (Truth::Absent, format!("the drive has no {name}")),
+            (None, Missing::Device) if !drive.can_go_by(parameter) => {
+                (Truth::Absent, "the drive does not report what it is a limit of".to_owned())
+            }
             (None, Missing::Device) if parameter == Parameter::STOPPING_TORQUE => {
                 (Truth::Compared, "the torque limits of the drive".to_owned())
             }

@@ -363,7 +363,7 @@ impl Engine {
         }
         for channel in devices {
             channel.exchange(&mut exchange);
-            channel.attributes(mapping, exchange.axes, buses);
+            channel.attributes(mapping, exchange.axes, buses, exchange.notice);
         }
     }
 

@@ -38,6 +38,7 @@ impl Translator {
             Backing::Connection => ("written by the connection".to_owned(), None),
             Backing::Stored => ("stored and given back, without effect".to_owned(), None),
             Backing::Constant(value) => (text!("always {value}"), None),
+            Backing::Mechanics(_) => ("compared with the scaling of the drive".to_owned(), None),
             Backing::Signal { signal, .. } if entry.access == Access::SetCyclic => {
                 (text!("shows {signal}, set by cyclic write data only"), None)
             }

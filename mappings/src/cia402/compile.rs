@@ -7,6 +7,7 @@ use profile_generic::parameter::Parameter;
 use profile_generic::program::{BitPattern, Conversion, Field, Width};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
+use profile_generic::scaling::UnitKind;
 use profile_generic::time::DurationNs;
 
 use super::facts::ObjectFacts;
@@ -22,6 +23,7 @@ use crate::drive_program::{
 };
 use crate::drive_rows::Full;
 use crate::item::Item;
+use crate::mechanics::Mechanics;
 use crate::sercos::scaling::AxisUnits;
 
 /// Octets of a mode of operation.
@@ -369,7 +371,21 @@ impl Cia402Tables {
         let error = item(self.words.error)?;
         program.add_faults(self.faults.iter().map(|row| FaultRow { word: error, ..*row }))?;
         program.add_parameters(&self.parameters, |rule| self.entry(rule, axis, facts))?;
+        program.mechanics = Some(self.mechanics(axis, facts));
         Ok(program)
+    }
+
+    /// What lies between motor and load: the gear of the drive, and the travel of the configuration.
+    fn mechanics(&self, axis: &Cia402Axis, facts: &ObjectFacts) -> Mechanics {
+        let turns = |parameter| {
+            let rule = self.parameters.iter().find(|rule| rule.parameter == parameter)?;
+            facts.number(&rule.at.value).filter(|turns| *turns > 0)
+        };
+        let motor = turns(Parameter::GEAR_RATIO_NUMERATOR);
+        let load = turns(Parameter::GEAR_RATIO_DENOMINATOR);
+        let gear = motor.zip(load).and_then(|(motor, load)| Ratio::new(motor, load));
+        let kind = axis.units.kind;
+        Mechanics { kind, gear, travel: axis.way_of_a_turn.filter(|_| kind == UnitKind::Linear) }
     }
 
     /// What the telegrams carry at most, of a drive that lacks nothing.

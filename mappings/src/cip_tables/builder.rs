@@ -30,6 +30,7 @@ use crate::format::{
 };
 use crate::generic_names::{capture_kind, cause, operating_mode, reaction, signal, status_bit, unit_kind};
 use crate::load::Parsed;
+use crate::mechanics::MechanicalFact;
 use crate::resolver::Resolver;
 
 impl CipTables {
@@ -64,6 +65,7 @@ impl CipTables {
         builder.inhibits(rows);
         builder.stoppings(rows);
         builder.sequence(rows);
+        builder.mechanics(rows);
         builder.events(rows);
         for row in &rows.attribute {
             builder.attribute(row);
@@ -101,7 +103,11 @@ impl Builder<'_> {
                     }
                 }
             };
-            self.tables.units.push((row.unit.get_ref().clone(), quantity, CipUnit { ratio, times }));
+            self.tables.units.push((
+                row.unit.get_ref().clone(),
+                quantity,
+                CipUnit { ratio, times, reciprocal: row.reciprocal },
+            ));
         }
     }
 
@@ -573,9 +579,43 @@ impl Builder<'_> {
             zero_speed: self.attribute_id("zero_speed", &row.zero_speed),
             zero_speed_time: self.attribute_id("zero_speed_time", &row.zero_speed_time),
             ramp_deceleration: self.attribute_id("ramp_deceleration", &row.ramp_deceleration),
+            deceleration_limit: self.attribute_id("deceleration_limit", &row.deceleration_limit),
             flying_start: self.attribute_id("flying_start", &row.flying_start),
             overtravel_checking: self.attribute_id("overtravel_checking", &row.overtravel_checking),
         };
+    }
+
+    fn mechanics(&mut self, rows: &CipGenericFile) {
+        let row = &rows.mechanics;
+        let load = |builder: &mut Self, key, name| builder.code("Load Type", key, name).map(i64::from);
+        let actuator =
+            |builder: &mut Self, key, name| builder.code("Actuator Type", key, name).map(i64::from);
+        let load_type = match (
+            load(self, "direct_rotary", &row.direct_rotary),
+            load(self, "rotary_transmission", &row.rotary_transmission),
+            load(self, "linear_actuator", &row.linear_actuator),
+        ) {
+            (Some(direct), Some(transmission), Some(actuator)) => {
+                Some(MechanicalFact::LoadType { direct, transmission, actuator })
+            }
+            _ => None,
+        };
+        let actuator_type = match (
+            actuator(self, "no_actuator", &row.no_actuator),
+            actuator(self, "actuator", &row.actuator),
+        ) {
+            (Some(none), Some(usual)) => Some(MechanicalFact::ActuatorType { none, usual }),
+            _ => None,
+        };
+        for (key, name, fact) in [
+            ("load_type", &row.load_type, load_type),
+            ("actuator_type", &row.actuator_type, actuator_type),
+            ("lead", &row.lead, Some(MechanicalFact::Lead)),
+            ("diameter", &row.diameter, Some(MechanicalFact::Diameter)),
+        ] {
+            let id = self.attribute_id(key, name);
+            self.tables.mechanics.extend(fact.map(|fact| (id, fact)));
+        }
     }
 
     fn events(&mut self, rows: &CipGenericFile) {
@@ -629,6 +669,7 @@ impl Builder<'_> {
         let served = match (&row.parameter, &row.signal, &row.served_by) {
             (Some(name), None, None) => self.parameter(row, attribute, name),
             (None, Some(name), None) => self.signal_attribute(attribute, name),
+            (None, None, Some(name)) if name.get_ref() == "mechanics" => self.mechanical(attribute, name),
             (None, None, Some(name)) => {
                 let value = self.constant(row, attribute, name);
                 let words = [
@@ -663,7 +704,33 @@ impl Builder<'_> {
             Served::Constant(value) => Some((value, value)),
             _ => row.range.map(|[low, high]| (low, high)),
         };
-        self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served, range });
+        let without = self.codes_without(row, attribute);
+        self.tables.attributes.push(ServedAttribute { attribute: attribute.clone(), served, range, without });
+    }
+
+    /// The codes that an attribute cannot be set to.
+    fn codes_without(&mut self, row: &CipAttributeRow, attribute: &CipAttribute) -> Vec<u32> {
+        let sets = self.dictionaries.cip.enumerations();
+        let set = sets.iter().find(|set| set.element.is_empty() && set.attributes.contains(&attribute.id));
+        let known = || set.into_iter().flat_map(|set| &set.codes);
+        let what = format!("a code of {}", attribute.name);
+        let mut codes = Vec::with_capacity(row.without.len());
+        for name in &row.without {
+            let find = |text: &str| known().find(|code| code.name == text).map(|code| code.code);
+            let names = known().map(|code| code.name.as_str());
+            codes.extend(self.resolver.name("without", name, &what, find, names));
+        }
+        codes
+    }
+
+    /// An attribute of `[mechanics]`.
+    fn mechanical(&mut self, attribute: &CipAttribute, name: &Name) -> Option<Served> {
+        let found = self.tables.mechanics.iter().find(|(id, _)| *id == attribute.id);
+        if found.is_none() {
+            let message = format!("expected an attribute that [mechanics] names, got {}", attribute.name);
+            self.resolver.error(code::CONTRADICTION, name.span(), "served_by", message);
+        }
+        found.map(|(_, fact)| Served::Mechanics(*fact))
     }
 
     /// The value of a constant; 0 for anything else.
@@ -768,6 +835,11 @@ impl Builder<'_> {
             self.resolver.error(code::UNIT, name.span(), "signal", no_unit(attribute, signal.quantity()));
             return None;
         };
+        if unit.reciprocal {
+            let message = format!("expected a unit that is no reciprocal, {} is a signal", attribute.name);
+            self.resolver.error(code::UNIT, name.span(), "signal", message);
+            return None;
+        }
         Some(Served::Signal { signal, unit })
     }
 

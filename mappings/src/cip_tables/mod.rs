@@ -18,6 +18,7 @@ use super::compile_cip::{
 };
 use super::device_link::DRIVE_ACTIONS;
 use super::dictionary::{CipAttribute, CipType};
+use super::mechanics::MechanicalFact;
 
 /// What multiplies the ratio of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -37,6 +38,8 @@ pub struct CipUnit {
     pub ratio: Ratio,
     /// What multiplies it.
     pub times: Times,
+    /// The value is one over the generic one; 0 on both sides is "none".
+    pub reciprocal: bool,
 }
 
 /// A displacement unit.
@@ -114,6 +117,8 @@ pub struct SequenceAttributes {
     pub zero_speed_time: u16,
     /// Deceleration of a ramped stop.
     pub ramp_deceleration: u16,
+    /// The same where that was not set.
+    pub deceleration_limit: u16,
     /// Whether an axis may be started while it moves.
     pub flying_start: u16,
     /// Whether a limit switch stops the axis.
@@ -144,6 +149,8 @@ pub enum Served {
     Stored,
     /// It never changes.
     Constant(i64),
+    /// It is what the scaling of the drive comes to.
+    Mechanics(MechanicalFact),
     /// A value of the process image.
     Signal {
         /// The signal.
@@ -171,13 +178,19 @@ pub enum Missing {
     Absent,
     /// The device goes by its value itself.
     Device,
+    /// The loops of the drive have no such term: it is 0, and can be set to nothing else.
+    Zero,
     /// Stored and given back, without effect.
     Stored,
 }
 
 /// Words of `missing`; without one the attribute is not supported.
-pub(crate) const MISSING: [(&str, Missing); 3] =
-    [("reject", Missing::Absent), ("device", Missing::Device), ("stored", Missing::Stored)];
+pub(crate) const MISSING: [(&str, Missing); 4] = [
+    ("reject", Missing::Absent),
+    ("device", Missing::Device),
+    ("zero", Missing::Zero),
+    ("stored", Missing::Stored),
+];
 
 /// An attribute that the device serves.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -188,6 +201,8 @@ pub struct ServedAttribute {
     pub served: Served,
     /// Least and greatest value that may be set.
     pub range: Option<(i64, i64)>,
+    /// Codes that it cannot be set to, of those that it has.
+    pub without: Vec<u32>,
 }
 
 /// Who finds a fault.
@@ -223,6 +238,8 @@ pub struct CipTables {
     pub scaling: ScalingAttributes,
     /// The attributes of the start and stop sequences.
     pub sequence: SequenceAttributes,
+    /// The attributes of what lies between motor and load, by number.
+    pub(super) mechanics: Vec<(u16, MechanicalFact)>,
     /// What Motion Unit may be.
     pub motion_units: Vec<DisplacementUnit>,
     /// What Feedback n Unit may be.
@@ -272,7 +289,7 @@ impl CipTables {
     /// How `unit` becomes `quantity`; an attribute without a unit is a bare number.
     pub(super) fn unit(&self, unit: &str, quantity: Quantity) -> Option<CipUnit> {
         if unit.is_empty() && quantity == Quantity::None {
-            return Some(CipUnit { ratio: Ratio::ONE, times: Times::One });
+            return Some(CipUnit { ratio: Ratio::ONE, times: Times::One, reciprocal: false });
         }
         let row = self.units.iter().find(|(known, of, _)| known == unit && *of == quantity)?;
         Some(row.2)

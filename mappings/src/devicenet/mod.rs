@@ -178,7 +178,9 @@ impl Mapping {
         value: i64,
     ) -> Result<(u16, f32), DevicenetError> {
         let holds = |served: Served| match served {
-            Served::Parameter { parameter: known, unit, .. } if known == parameter => Some(unit),
+            Served::Parameter { parameter: known, unit, .. } if known == parameter && !unit.reciprocal => {
+                Some(unit)
+            }
             _ => None,
         };
         let real = self.cip.attributes.iter().filter(|row| row.attribute.data_type == CipType::Real);

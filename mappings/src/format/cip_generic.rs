@@ -47,6 +47,8 @@ pub struct CipGenericFile {
     pub stopping: Vec<StoppingRow>,
     /// Attributes of the start and stop sequences.
     pub sequence: SequenceRow,
+    /// Attributes of what lies between motor and load.
+    pub mechanics: MechanicsRow,
     /// Events.
     pub event: Vec<CipEventRow>,
     /// What an event is told as that cannot be found.
@@ -381,10 +383,38 @@ pub struct SequenceRow {
     pub zero_speed_time: Name,
     /// Deceleration of a ramped stop.
     pub ramp_deceleration: Name,
+    /// The same where that was not set.
+    pub deceleration_limit: Name,
     /// Whether an axis may be started while it moves.
     pub flying_start: Name,
     /// Whether a limit switch stops it.
     pub overtravel_checking: Name,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// The attributes of what lies between motor and load. They can be set to what the scaling of the drive comes to, and to nothing else.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MechanicsRow {
+    /// Kind of the load.
+    pub load_type: Name,
+    /// Its code for a shaft that turns with the motor.
+    pub direct_rotary: Name,
+    /// Its code for a shaft behind a gear.
+    pub rotary_transmission: Name,
+    /// Its code for a load that a turning motor moves along a line.
+    pub linear_actuator: Name,
+    /// Kind of the actuator that does that.
+    pub actuator_type: Name,
+    /// Its code for none.
+    pub no_actuator: Name,
+    /// Its code until the controller sets another one that is an actuator too.
+    pub actuator: Name,
+    /// Travel of the load in a turn of the shaft, millimetre.
+    pub lead: Name,
+    /// Diameter of a wheel with that circumference, millimetre.
+    pub diameter: Name,
     /// Where it comes from.
     pub source: Source,
 }
@@ -419,15 +449,19 @@ pub struct CipAttributeRow {
     pub parameter: Option<Name>,
     /// Signal behind it.
     pub signal: Option<Name>,
-    /// Who serves it otherwise: `device`, `connection`, `constant` (it can only be set to what it is) or `stored` (without effect).
+    /// Who serves it otherwise: `device`, `connection`, `constant` (it can only be set to what it is), `mechanics` (of that section) or
+    /// `stored` (without effect).
     pub served_by: Option<Name>,
     /// Value of a constant.
     pub value: Option<i64>,
     /// What the attribute is of a drive without the parameter: `reject` (not supported, the default), `device` (the gateway goes by the
-    /// value itself) or `stored` (without effect).
+    /// value itself), `zero` (the loops of the drive have no such term: it can be set to 0 only) or `stored` (without effect).
     pub missing: Option<Name>,
     /// Least and greatest value that may be set; others are refused.
     pub range: Option<[i64; 2]>,
+    /// Names of codes that it cannot be set to, of those that it has.
+    #[serde(default)]
+    pub without: Vec<Name>,
     /// Where it comes from.
     pub source: Source,
     /// Worked examples.

@@ -57,6 +57,9 @@ pub struct UnitRow {
     pub generic_per_unit: RatioRow,
     /// What multiplies the ratio: a scaling of the axis.
     pub times: Option<Name>,
+    /// The value is one over the generic one, as a bandwidth is of its time constant; 0 on both sides is "none". Of attributes only.
+    #[serde(default)]
+    pub reciprocal: bool,
     /// How drives spell the unit, in addition to the dictionary.
     #[serde(default)]
     pub texts: Vec<String>,

@@ -7,6 +7,7 @@ use profile_generic::parameter::Parameter;
 use profile_generic::program::{BitPattern, Conversion, Field, Width};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::{Ratio, Rounding};
+use profile_generic::scaling::UnitKind;
 use profile_sercos::wire::connection::CONNECTION_CONTROL_LEN;
 use profile_sercos::wire::idn::Idn;
 
@@ -24,6 +25,7 @@ use crate::drive_program::{
 };
 use crate::drive_rows::Full;
 use crate::item::Item;
+use crate::mechanics::Mechanics;
 
 /// Wraps of a position that does not work modulo: the range of its 32 bits.
 const FULL_RANGE: i64 = 1 << 32;
@@ -443,6 +445,7 @@ impl DriveProgram {
         compiler.add_status(&mut program)?;
         compiler.add_faults(&mut program)?;
         program.add_parameters(&tables.parameters, |rule| compiler.parameter(rule))?;
+        program.mechanics = Some(compiler.mechanics());
         program.captures = captures::compile(&compiler, &program.telegram);
         Ok(program)
     }
@@ -633,6 +636,19 @@ impl Compiler<'_> {
         // One count less than half, for the rounding of both ends.
         let half = lsb.modulo.map(|(range, _)| range / 2 - 1);
         Ok(half.map(|half| lsb.generic.convert(half, Rounding::Floor).value))
+    }
+
+    /// What lies between motor and load, by the gear and the feed constant of the positions.
+    fn mechanics(&self) -> Mechanics {
+        let kind = self.axis.units.kind;
+        let turns = |idn| self.facts.number(idn, self.dictionary).filter(|turns| *turns > 0);
+        // The gear of torques goes the other way.
+        let rules = self.tables.scalings.iter();
+        let gear = rules.clone().filter_map(|rule| rule.gear).find(|gear| gear.generic.is_none());
+        let gear = gear.and_then(|gear| Ratio::new(turns(gear.motor)?, turns(gear.load)?));
+        let feed = rules.filter_map(|rule| rule.feed).next();
+        let travel = feed.and_then(|idn| feed_constant(self.tables, self.dictionary, self.facts, idn).ok());
+        Mechanics { kind, gear, travel: travel.filter(|_| kind == UnitKind::Linear) }
     }
 
     /// The entry of a parameter; `None` when the drive lacks it or does not report its unit.

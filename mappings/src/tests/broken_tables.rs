@@ -57,7 +57,7 @@ const CASES: &[Case] = &[
         "{ attribute = \"Motor Catalog Number\", served_by = \"device\", range = [0, 1],",
     ),
     ("unknown attribute", |t| &mut t.cip_generic, "attribute = \"Kpp\"", "attribute = \"Kpq\""),
-    ("unit does not convert", |t| &mut t.cip_generic, "\"position_loop_gain\"", "\"power_loss_time\""),
+    ("unit does not convert", |t| &mut t.cip_generic, "\"position_loop_gain\"", "\"jerk_limit\""),
     ("trim that is no offset", |t| &mut t.cip_generic, "\"torque_offset\"", "\"torque_command\""),
     ("unknown exception", |t| &mut t.cip_generic, "exception = \"Brake Slip\"", "exception = \"Brake Slap\""),
     (

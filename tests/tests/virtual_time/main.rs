@@ -35,6 +35,7 @@ mod programs;
 mod reconnect;
 mod scaling;
 mod scripts;
+mod settings;
 mod stalled;
 mod startup_lists;
 mod stopping;

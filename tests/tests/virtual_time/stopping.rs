@@ -19,6 +19,7 @@ const SLOW: Limits = Limits { velocity: 2.0, acceleration: 50.0, jerk: 1_000.0 }
 
 /// Numbers of the attributes that these tests set.
 mod id {
+    pub const RAMP_DECELERATION: u16 = 377;
     pub const FLYING_START_ENABLE: u16 = 380;
     pub const DECELERATION_LIMIT: u16 = 486;
     pub const STOPPING_ACTION: u16 = 610;
@@ -173,6 +174,24 @@ fn a_stop_that_takes_too_long_ends_without_torque_and_with_a_fault() {
     assert_eq!(state(&rig), AxisState::Aborting);
     rig.run_until(millis(10_000), "rest", |rig| state(rig) == AxisState::MajorFaulted);
     assert!(rig.velocity(0).abs() <= NANO / 10, "Major Faulted only at rest: {}", rig.velocity(0));
+}
+
+/// A Ramped Decel takes the deceleration of the ramp generator; the Deceleration Limit where that was not set.
+#[test]
+fn a_ramped_stop_takes_the_ramp_deceleration_that_was_set() {
+    for (ramp, after) in [(None, 0), (Some(2.0), 150), (Some(4.0), 100)] {
+        let mut first = attributes(2, false);
+        if let (Some(ramp), Step::SetAttributes { attributes, .. }) = (ramp, &mut first) {
+            attributes.push(AttributeSet::real(id::RAMP_DECELERATION, ramp));
+        }
+        let mut rig = running(Settings::default(), true, first);
+        request(&mut rig, AxisControl::DISABLE);
+        rig.run_until(millis(50), "Stopping", |rig| state(rig) == AxisState::Stopping);
+        rig.run_for(millis(250));
+        // From 2 rev/s; at 10 rev/s2 it stands after 200 ms.
+        let speed = rig.velocity(0) / (NANO / 100);
+        assert!((speed - after).abs() <= 4, "{ramp:?}: {speed} hundredths of a rev/s");
+    }
 }
 
 #[test]

@@ -215,6 +215,11 @@ impl AxisChannel {
         let is_led = |axis: &Self| matches!(axis.state(), DriveState::Operating | DriveState::Testing);
         let passed = self.supervision.passed_limits(&self.feedback, is_led(self), error);
         self.watch_conditions(now, system, &passed);
+        let error = self.velocity_error();
+        let torque = self.feedback.get(Signal::TorqueActual).filter(|_| is_led(self)).map(Torque);
+        let tolerances = self.start_stop.settings.tolerances;
+        let passed = self.supervision.tolerances.look(now, &tolerances, error, torque);
+        self.watch_conditions(now, system, &passed);
         let motion = |axis: &Self| Motion {
             led: is_led(axis),
             moves: moved || axis.may_move(),
@@ -230,6 +235,16 @@ impl AxisChannel {
         let checked = !homes && self.start_stop.settings.checks_overtravel;
         let passed = self.supervision.passed_switches(self.feedback.status, checked, &motion(self));
         self.watch_conditions(now, system, &passed);
+    }
+
+    /// How much the velocity differs from the commanded one, which in position control is that of the commanded position; `None` while the
+    /// drive does not follow one.
+    fn velocity_error(&self) -> Option<Velocity> {
+        let follows = self.state() == DriveState::Operating && self.drive.action == Action::Enable;
+        let has_one = [OperatingMode::Position, OperatingMode::Velocity]
+            .iter()
+            .any(|mode| self.command.selection() == (*mode).into());
+        (follows && has_one).then(|| self.command.velocity.saturating_sub(self.feedback.velocity))
     }
 
     /// Conditions that the gateway watches are there, or are not.

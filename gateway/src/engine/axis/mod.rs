@@ -47,6 +47,7 @@ mod start_stop;
 mod supervision;
 #[cfg(test)]
 mod tests;
+mod tolerance;
 mod trim;
 mod velocimeter;
 mod waiting;
@@ -59,6 +60,7 @@ pub use self::position_jump::PositionJump;
 pub use self::reactions::Reactions;
 pub use self::set_points::{NorthPoints, Target, Updates};
 pub use self::start_stop::StopSettings;
+pub use self::tolerance::Tolerances;
 pub use self::waiting::{Awaited, Waiting};
 
 use crate::mapping::DriveProgram;

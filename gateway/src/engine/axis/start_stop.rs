@@ -22,7 +22,7 @@ use profile_generic::sequence::{
 use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::{START_TIME_OUT, STOP_TIME_OUT};
+use super::{START_TIME_OUT, STOP_TIME_OUT, Tolerances};
 
 /// How an axis is to start and stop, and what stops it, as controller and configuration have it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,6 +37,8 @@ pub struct StopSettings {
     pub flying_start: bool,
     /// A limit switch stops it.
     pub checks_overtravel: bool,
+    /// Limits that may be passed for a time.
+    pub tolerances: Tolerances,
 }
 
 /// Where in a start or stop one axis is.

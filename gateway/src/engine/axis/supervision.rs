@@ -8,6 +8,7 @@ use profile_generic::time::MonotonicTime;
 
 use super::overtravel::{Motion, Overtravel};
 use super::position_jump::Plausibility;
+use super::tolerance::ToleranceWatch;
 use super::velocimeter::Velocimeter;
 use super::{Limits, PositionJump, SILENCE_TIME_OUT};
 
@@ -23,6 +24,7 @@ pub(super) struct Supervision {
     plausibility: Plausibility,
     switches: Overtravel,
     software_limits: Overtravel,
+    pub tolerances: ToleranceWatch,
     /// Since when the drive is not heard.
     silent_since: Option<MonotonicTime>,
     /// That is so long ago that the end of its stop is waited for no longer.
@@ -37,6 +39,7 @@ impl Supervision {
             plausibility: Plausibility::default(),
             switches: Overtravel::default(),
             software_limits: Overtravel::default(),
+            tolerances: ToleranceWatch::default(),
             silent_since: None,
             unseen: false,
         }

@@ -16,7 +16,8 @@ use crate::engine::bus::{Answer, Buses, Purpose};
 use crate::engine::notice::Notice;
 use crate::engine::parameter::{ParameterJob, ParameterJobs};
 use crate::mapping::{
-    self, AttributeEntry, AttributeTable, Backing, Mapping, Missing, ParameterEntry, SequenceAttributes,
+    self, AttributeEntry, AttributeTable, Backing, Mapping, MechanicalFact, Missing, Number, ParameterEntry,
+    SequenceAttributes,
 };
 
 /// Writes to the drive that may be under way for one axis.
@@ -65,11 +66,13 @@ impl Accesses {
         access: &AttributeAccess,
         buses: &mut Buses,
         mapping: &Mapping,
+        notice: &mut dyn FnMut(Notice),
     ) -> Result<(), GeneralStatus> {
         let entry = *on.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let (parameter, missing) = match entry.backing {
             Backing::Signal { .. } => return on.read_signal(access),
             Backing::Parameter { parameter, missing, .. } => (parameter, missing),
+            Backing::Mechanics(fact) => return on.compare_mechanics(access, &entry, fact, notice),
             _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
         };
         let program = on.axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
@@ -77,8 +80,13 @@ impl Accesses {
             return self.compute(access, &entry, parameter);
         }
         let Some(held) = program.parameter(parameter) else {
-            if missing == Missing::Absent {
-                return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
+            match missing {
+                Missing::Zero if program.has_parameters() => return on.compare_zero(access, &entry, notice),
+                Missing::Device if !program.can_go_by(parameter) => {
+                    return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
+                }
+                Missing::Device | Missing::Stored => {}
+                Missing::Absent | Missing::Zero => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
             }
             if let AccessOperation::Write(bytes) = &access.operation
                 && stopping_torque::is_stopping_torque(&entry)
@@ -190,7 +198,8 @@ impl Accesses {
     /// Remembers what is written to the drive for an attribute that the sequences go by.
     fn note_write(&mut self, access: &AttributeAccess, sequence: &SequenceAttributes) {
         if let AccessOperation::Write(bytes) = &access.operation
-            && [sequence.zero_speed, sequence.ramp_deceleration].contains(&access.id)
+            && [sequence.zero_speed, sequence.ramp_deceleration, sequence.deceleration_limit]
+                .contains(&access.id)
             && let Ok(value) = ArrayVec::try_from(&bytes[..])
         {
             if self.writes.is_full() {
@@ -283,13 +292,67 @@ impl Accessed<'_> {
         if entry.agree(wanted, held) {
             return Ok(0);
         }
-        notice(Notice::NotEqual {
-            axis: u8::try_from(self.axis_number).unwrap_or(u8::MAX),
-            attribute,
-            wanted: entry.number(wanted),
-            held: entry.number(held),
-        });
-        Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)
+        Err(self.not_equal(attribute, (entry.number(wanted), entry.number(held)), notice))
+    }
+
+    /// The answer to a value that is not the one that is held, and both in the log.
+    fn not_equal(
+        &self,
+        attribute: u16,
+        (wanted, held): (Option<Number>, Option<Number>),
+        notice: &mut dyn FnMut(Notice),
+    ) -> GeneralStatus {
+        let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
+        notice(Notice::NotEqual { axis, attribute, wanted, held });
+        GeneralStatus::INVALID_ATTRIBUTE_VALUE
+    }
+
+    /// A term that the loops of the drive do not have: it is 0.
+    fn compare_zero(
+        &mut self,
+        access: &AttributeAccess,
+        entry: &AttributeEntry,
+        notice: &mut dyn FnMut(Notice),
+    ) -> Result<(), GeneralStatus> {
+        if let AccessOperation::Write(bytes) = &access.operation {
+            let wanted = entry.number(bytes);
+            let is_zero = matches!(wanted, Some(Number::Integer(0)))
+                || matches!(wanted, Some(Number::Real(value)) if value == 0.0);
+            if !is_zero {
+                return Err(self.not_equal(access.id, (wanted, Some(Number::Integer(0))), notice));
+            }
+        }
+        self.keep(access)
+    }
+
+    /// What the scaling of the drive comes to. What the controller has set is shown again as long as it is so.
+    fn compare_mechanics(
+        &mut self,
+        access: &AttributeAccess,
+        entry: &AttributeEntry,
+        fact: MechanicalFact,
+        notice: &mut dyn FnMut(Notice),
+    ) -> Result<(), GeneralStatus> {
+        let program = self.axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+        let known = program.mechanics.and_then(|mechanics| Some((mechanics, mechanics.value(fact)?)));
+        let (mechanics, value) = known.ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        let agrees = |bytes: &[u8]| entry.number(bytes).is_some_and(|number| mechanics.agrees(fact, number));
+        match &access.operation {
+            AccessOperation::Write(bytes) if agrees(bytes) => self.keep(access),
+            AccessOperation::Write(bytes) => {
+                Err(self.not_equal(access.id, (entry.number(bytes), Some(value)), notice))
+            }
+            AccessOperation::Read(_) if self.device.attribute(self.place, access.id).is_ok_and(agrees) => {
+                self.keep(access)
+            }
+            AccessOperation::Read(_) => {
+                let mut bytes = [0; 8];
+                let len =
+                    entry.write_number(value, &mut bytes).ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+                self.device.complete_attribute(access.ticket, Ok(&bytes[..len]));
+                Ok(())
+            }
+        }
     }
 
     /// A parameter that the drive lacks: kept and given back.
@@ -324,7 +387,9 @@ impl Accessed<'_> {
             return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
         }
         let (bytes, len, clamped) = held.encode(generic).ok_or(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)?;
-        if clamped {
+        // One count of the drive may be more than a time: written as 0 it would be none.
+        let vanishes = entry.is_reciprocal() && generic != 0 && bytes[..len].iter().all(|octet| *octet == 0);
+        if clamped || vanishes {
             return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
         }
         Access::write(held.item, &bytes[..len]).ok_or(GeneralStatus::TOO_MUCH_DATA)

@@ -284,14 +284,20 @@ impl DeviceChannel {
     }
 
     /// Carries accesses to attributes that live in the drive, or in its process image, to where they live.
-    pub fn attributes(&mut self, mapping: &Mapping, axes: &[AxisChannel], buses: &mut Buses) {
+    pub fn attributes(
+        &mut self,
+        mapping: &Mapping,
+        axes: &[AxisChannel],
+        buses: &mut Buses,
+        notice: &mut dyn FnMut(Notice),
+    ) {
         for _ in 0..ACCESSES_PER_CYCLE {
             let Some(access) = self.device.poll_attribute_access() else { break };
             let place = usize::from(access.instance).checked_sub(1);
             let begun = place.ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED).and_then(|place| {
                 let member = self.members.get_mut(place).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
                 let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-                accesses.begin(&mut on, &access, buses, mapping)
+                accesses.begin(&mut on, &access, buses, mapping, notice)
             });
             if let Err(status) = begun {
                 self.device.complete_attribute(access.ticket, Err(status));

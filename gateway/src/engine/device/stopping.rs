@@ -4,15 +4,16 @@ use profile_cip::device::motion_device::{MotionDevice, SequenceSettings};
 use profile_cip::wire::motion::codes::ControlMode;
 use profile_generic::fault::Reaction;
 use profile_generic::mode::OperatingMode;
-use profile_generic::quantity::{Acceleration, Velocity};
+use profile_generic::parameter::Parameter;
+use profile_generic::quantity::{Acceleration, Torque, Velocity};
 use profile_generic::sequence::SequenceTimes;
 use profile_generic::time::DurationNs;
 
 use super::access::{generic_of, held};
 use super::axis::CipAxis;
 use super::scaling::number_of;
-use crate::engine::axis::{AxisChannel, StopSettings};
-use crate::mapping::{AttributeTable, SequenceAttributes};
+use crate::engine::axis::{AxisChannel, StopSettings, Tolerances};
+use crate::mapping::{AttributeEntry, AttributeTable, Backing, SequenceAttributes};
 
 /// What a stop falls back to where the controller has set nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -86,9 +87,14 @@ impl Settings<'_> {
         let settings = StopSettings {
             plan: stopping.map(|row| row.plan).unwrap_or_default(),
             times: self.times(defaults),
-            deceleration: self.value(rows.ramp_deceleration).map(Acceleration).or(defaults.deceleration),
+            deceleration: self
+                .value(rows.ramp_deceleration)
+                .or_else(|| self.value(rows.deceleration_limit))
+                .map(Acceleration)
+                .or(defaults.deceleration),
             flying_start: raw(rows.flying_start) != 0 && by_velocity,
             checks_overtravel: raw(rows.overtravel_checking) != 0,
+            tolerances: self.tolerances(),
         };
         let abort: Reaction = stopping.map(|row| row.abort).unwrap_or_default();
         let abort = cip.program().fault_action(abort);
@@ -109,6 +115,24 @@ impl Settings<'_> {
             coasting_limit: time(rows.coasting_time_limit).unwrap_or(stopping_limit),
             zero_speed: self.value(rows.zero_speed).map_or(defaults.zero_speed, Velocity),
             zero_speed_time: time(rows.zero_speed_time).unwrap_or_default(),
+        }
+    }
+
+    /// Limits of velocity error and torque. A drive that has the parameter watches it itself.
+    fn tolerances(&self) -> Tolerances {
+        let of = |parameter| {
+            let mut entries = self.attributes.entries().iter();
+            let is = |entry: &&AttributeEntry| matches!(entry.backing, Backing::Parameter { parameter: own, .. } if own == parameter);
+            let id = entries.find(is)?.id;
+            if self.is_in_drive(id) { None } else { self.value(id) }
+        };
+        Tolerances {
+            velocity_error: of(Parameter::VELOCITY_ERROR_TOLERANCE).map(Velocity),
+            velocity_error_time: of(Parameter::VELOCITY_ERROR_TOLERANCE_TIME)
+                .map(DurationNs)
+                .unwrap_or_default(),
+            over_torque: of(Parameter::OVER_TORQUE_LIMIT).map(Torque),
+            over_torque_time: of(Parameter::OVER_TORQUE_LIMIT_TIME).map(DurationNs),
         }
     }
 

@@ -282,7 +282,7 @@ impl<'m> Joined<'m> {
             let Some(attribute) = self.mapping.dictionaries.cip.attribute_by_id(entry.id) else { continue };
             let row = file.rows.attribute.iter().find(|row| *row.attribute.get_ref() == attribute.name);
             let ratio = match &entry.backing {
-                Backing::Parameter { to_generic, .. } => Some(to_generic.ratio),
+                Backing::Parameter { to_generic, reciprocal: false, .. } => Some(to_generic.ratio),
                 Backing::Signal { from_generic, .. } => from_generic.ratio.inverse(),
                 _ => None,
             };

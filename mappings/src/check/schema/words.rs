@@ -118,7 +118,7 @@ fn of_builders(row: &str, key: &str) -> Option<Vec<&'static str>> {
         (_, "refused") => named(&FAILS),
         (_, "interpolation") => vec!["controller", "drive"],
         (_, "voltage_bit") => named(&VOLTAGE_BIT),
-        (_, "served_by") => vec!["device", "connection", "stored", "constant"],
+        (_, "served_by") => vec!["device", "connection", "stored", "constant", "mechanics"],
         (_, "found_by") => vec!["box", "device"],
         (_, "drive_action") => named(&DRIVE_ACTIONS),
         ("UnitRow", "times") => vec!["motion_count", "motion_unit"],

@@ -17,6 +17,14 @@ const STORED_MAX: usize = 20;
 /// The parameter of an attribute that the gateway compares with others where a drive has none.
 const STOPPING_TORQUE: &str = "stopping_torque";
 
+/// Parameters of attributes that the gateway watches an axis by where a drive has none.
+const WATCHED: [&str; 4] = [
+    "velocity_error_tolerance",
+    "velocity_error_tolerance_time",
+    "over_torque_limit",
+    "over_torque_limit_time",
+];
+
 pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_sercos;
     let mut reporter = Reporter { source: &file.text, findings };
@@ -161,7 +169,8 @@ pub(super) fn cip(mapping: &Mapping, findings: &mut Findings) {
         {
             let what = [
                 format!("`{}` would be accepted without effect", attribute.name),
-                "the gateway goes by the attributes of [sequence] and by Stopping Torque alone".to_owned(),
+                "the gateway goes by the attributes of [sequence], by Stopping Torque and by what it watches alone"
+                    .to_owned(),
                 "remove `missing`".to_owned(),
             ];
             reporter.report(POLICY_WEAK, ("missing", missing.span()), what);
@@ -203,6 +212,9 @@ fn goes_by(mapping: &Mapping, row: &CipAttributeRow, id: u16) -> bool {
         sequence.zero_speed,
         sequence.zero_speed_time,
         sequence.ramp_deceleration,
+        sequence.deceleration_limit,
     ];
-    ids.contains(&id) || row.parameter.as_ref().is_some_and(|name| name.get_ref() == STOPPING_TORQUE)
+    let watched =
+        |name: &Name| name.get_ref() == STOPPING_TORQUE || WATCHED.contains(&name.get_ref().as_str());
+    ids.contains(&id) || row.parameter.as_ref().is_some_and(watched)
 }

@@ -284,7 +284,10 @@ fn shafts(reporter: &mut Reporter<'_>, row: &SercosScalingRow) -> bool {
 fn units(reporter: &mut Reporter<'_>, rows: &[UnitRow]) {
     for row in rows {
         let name = row.unit.get_ref().as_str();
-        if let Some((_, right)) = UNITS.iter().find(|(known, _)| *known == name) {
+        if row.reciprocal {
+            // One over it are seconds, which the generic model counts in nanoseconds.
+            ratio(reporter, name, &row.generic_per_unit, 1e9);
+        } else if let Some((_, right)) = UNITS.iter().find(|(known, _)| *known == name) {
             ratio(reporter, name, &row.generic_per_unit, *right);
         }
     }

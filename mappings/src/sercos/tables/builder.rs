@@ -593,8 +593,14 @@ impl<'a> Builder<'a> {
         let idn = self.idn("idn", &row.idn);
         let (Some(rule), Some(idn)) = (rule, idn) else { return };
         let quantity = rule.quantity;
-        if row.unit_by_drive != (idn.unit == IdnUnit::None && quantity != Quantity::None) {
-            let message = "expected `unit_by_drive` for an IDN whose unit the dictionary does not know, and for no other";
+        let is_wrong = match (row.unit_by_drive, &idn.unit) {
+            // Of a unit that differs from drive to drive the dictionary has one of them.
+            (true, IdnUnit::None | IdnUnit::Fixed { .. }) => quantity == Quantity::None,
+            (true, IdnUnit::Scaled(_)) => true,
+            (false, unit) => *unit == IdnUnit::None && quantity != Quantity::None,
+        };
+        if is_wrong {
+            let message = "expected `unit_by_drive` for an IDN whose unit the dictionary does not know, and for none with a scaling";
             let help = match row.unit_by_drive {
                 true => "remove `unit_by_drive`",
                 false => "add `unit_by_drive = true`, or the `unit` of the IDN to its row in the dictionary",

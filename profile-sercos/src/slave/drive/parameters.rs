@@ -232,6 +232,10 @@ fn define_settings(store: &mut Store) {
         value(Idn::NEGATIVE_TORQUE_LIMIT, a::TORQUE_UNSIGNED, "Negative torque/force limit value", 1)
             .range(1, word),
         value(Idn::POSITION_LOOP_KV, a::GAIN, "Position loop Kv-factor", 1).unit("1000/min").range(1, word),
+        // 10 ms; a drive in the lists of Rexroth has 0.0 to 3276.7 ms.
+        value(Idn::standard(101), a::DELAY, "Velocity loop integral action time", 100)
+            .unit("ms")
+            .range(0, 32_767),
         value(Idn::STANDSTILL_WINDOW, a::VELOCITY, "Standstill window", 1).range(1, double),
         value(Idn::VELOCITY_THRESHOLD, a::VELOCITY, "Velocity threshold n_x", 0).range(0, double),
         value(Idn::TORQUE_THRESHOLD, a::TORQUE_UNSIGNED, "Torque/force threshold T_x", 0).range(0, word),

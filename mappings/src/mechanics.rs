@@ -1,0 +1,150 @@
+//! What lies between the motor of an axis and its load, as the scaling of its drive has it: gear and travel in a turn.
+//!
+//! A controller that scales for itself works with the same gear and travel. It can therefore set the attributes that describe them to what
+//! the drive has; another value would let the load go another way than the controller believes.
+
+use std::f64::consts::PI;
+
+use profile_generic::ratio::Ratio;
+use profile_generic::scaling::UnitKind;
+
+use super::attributes::Number;
+
+/// How far apart two lengths may be that are the same, of the larger one: a REAL has 24 bits, and every turn adds up.
+const SAME: f64 = 1e-6;
+
+/// What an attribute says of the mechanics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MechanicalFact {
+    /// Kind of the load, with the codes of its kinds.
+    LoadType {
+        /// A shaft that turns with the motor.
+        direct: i64,
+        /// A shaft behind a gear.
+        transmission: i64,
+        /// A turning motor moves the load along a line.
+        actuator: i64,
+    },
+    /// Kind of the actuator.
+    ActuatorType {
+        /// Code of none.
+        none: i64,
+        /// The code that is shown until another one is set.
+        usual: i64,
+    },
+    /// Travel of the load in a turn of its shaft, millimetre.
+    Lead,
+    /// Diameter of a wheel whose circumference is that travel, millimetre.
+    Diameter,
+}
+
+/// What lies between motor and load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Mechanics {
+    /// Whether the load turns or goes along a line.
+    pub kind: UnitKind,
+    /// Turns of the motor in a turn of the load; `None` where the drive knows of no gear.
+    pub gear: Option<Ratio>,
+    /// Millimetres that a linear load goes in a turn of its shaft; `None` of one that turns, and where nobody says it.
+    pub travel: Option<Ratio>,
+}
+
+impl Mechanics {
+    /// What an attribute is until the controller sets it; `None` where nobody knows.
+    #[must_use]
+    pub fn value(&self, fact: MechanicalFact) -> Option<Number> {
+        let is_linear = self.kind == UnitKind::Linear;
+        if is_linear && self.travel.is_none() {
+            return None;
+        }
+        let travel = self.travel.map_or(0.0, |travel| travel.to_f64(1));
+        Some(match fact {
+            MechanicalFact::LoadType { actuator, .. } if is_linear => Number::Integer(actuator),
+            MechanicalFact::LoadType { direct, transmission, .. } => {
+                Number::Integer(if self.is_direct() { direct } else { transmission })
+            }
+            MechanicalFact::ActuatorType { none, usual } => {
+                Number::Integer(if is_linear { usual } else { none })
+            }
+            MechanicalFact::Lead => Number::Real(travel),
+            MechanicalFact::Diameter => Number::Real(travel / PI),
+        })
+    }
+
+    /// Whether an attribute may be set to this.
+    #[must_use]
+    pub fn agrees(&self, fact: MechanicalFact, wanted: Number) -> bool {
+        match (fact, wanted, self.value(fact)) {
+            (_, _, None) => false,
+            // Turns that are as many on both sides are a transmission too.
+            (MechanicalFact::LoadType { transmission, .. }, Number::Integer(code), Some(held)) => {
+                held == wanted || (self.kind == UnitKind::Rotary && code == transmission)
+            }
+            // Whatever makes the travel: what counts is how long it is.
+            (MechanicalFact::ActuatorType { none, .. }, Number::Integer(code), Some(held)) => {
+                (code == none) == (held == Number::Integer(none))
+            }
+            (_, Number::Real(wanted), Some(Number::Real(held))) => {
+                (wanted - held).abs() <= wanted.abs().max(held.abs()) * SAME
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether the load turns as the motor does.
+    fn is_direct(&self) -> bool {
+        self.gear.is_none_or(|gear| gear.num() == gear.den())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LOAD: MechanicalFact = MechanicalFact::LoadType { direct: 0, transmission: 2, actuator: 3 };
+    const ACTUATOR: MechanicalFact = MechanicalFact::ActuatorType { none: 0, usual: 1 };
+
+    fn codes(mechanics: &Mechanics, fact: MechanicalFact) -> Vec<i64> {
+        (0..6).filter(|code| mechanics.agrees(fact, Number::Integer(*code))).collect()
+    }
+
+    #[test]
+    fn a_load_that_turns_has_a_gear_or_none_and_no_actuator() {
+        let mut axis = Mechanics { kind: UnitKind::Rotary, gear: None, travel: None };
+        assert_eq!((axis.value(LOAD), codes(&axis, LOAD)), (Some(Number::Integer(0)), vec![0, 2]));
+        axis.gear = Ratio::new(7, 7);
+        assert_eq!(codes(&axis, LOAD), [0, 2]);
+        axis.gear = Ratio::new(10, 1);
+        assert_eq!((axis.value(LOAD), codes(&axis, LOAD)), (Some(Number::Integer(2)), vec![2]));
+        assert_eq!((axis.value(ACTUATOR), codes(&axis, ACTUATOR)), (Some(Number::Integer(0)), vec![0]));
+        assert!(axis.agrees(MechanicalFact::Lead, Number::Real(0.0)));
+        assert!(!axis.agrees(MechanicalFact::Lead, Number::Real(10.0)));
+        assert!(!axis.agrees(MechanicalFact::Diameter, Number::Real(0.1)));
+        assert!(!axis.agrees(MechanicalFact::Lead, Number::Real(f64::NAN)));
+    }
+
+    #[test]
+    fn a_load_on_a_line_has_the_travel_of_the_drive_to_a_millionth() {
+        let axis = Mechanics { kind: UnitKind::Linear, gear: None, travel: Ratio::new(25, 2) };
+        assert_eq!((axis.value(LOAD), codes(&axis, LOAD)), (Some(Number::Integer(3)), vec![3]));
+        assert_eq!(axis.value(ACTUATOR), Some(Number::Integer(1)));
+        assert_eq!(codes(&axis, ACTUATOR), [1, 2, 3, 4, 5], "whatever makes the travel");
+        assert_eq!(axis.value(MechanicalFact::Lead), Some(Number::Real(12.5)));
+        for (lead, same) in [(12.5, true), (12.500_01, true), (12.500_02, false), (12.4999, false)] {
+            assert_eq!(axis.agrees(MechanicalFact::Lead, Number::Real(lead)), same, "{lead}");
+        }
+        // A wheel of 3.978874 mm has a circumference of 12.5 mm.
+        assert!(axis.agrees(MechanicalFact::Diameter, Number::Real(3.978_874)));
+        assert!(!axis.agrees(MechanicalFact::Diameter, Number::Real(3.978_9)));
+        assert!(!axis.agrees(MechanicalFact::Diameter, Number::Integer(4)));
+    }
+
+    #[test]
+    fn a_line_whose_travel_nobody_knows_says_nothing() {
+        let axis = Mechanics { kind: UnitKind::Linear, gear: Ratio::new(10, 1), travel: None };
+        for fact in [LOAD, ACTUATOR, MechanicalFact::Lead, MechanicalFact::Diameter] {
+            assert_eq!(axis.value(fact), None);
+            assert!(!axis.agrees(fact, Number::Integer(3)) && !axis.agrees(fact, Number::Real(0.0)));
+        }
+    }
+}
