@@ -231,7 +231,7 @@ registry! {
 
     UNIT = 30 Error "the unit does not convert":
         "The two ends of the row measure different things, or no [[unit]] or [[scaling]] row says how one becomes the other.",
-        "[[cip-generic.attribute]]\nattribute = \"Kpp\"\nparameter = \"power_loss_time\"",
+        "[[cip-generic.attribute]]\nattribute = \"Kpp\"\nparameter = \"bus_nominal_voltage\"",
         "Correct one of the ends, or add a [[unit]] row if the unit is new.";
     DIRECTION = 31 Error "the wrong direction":
         "A command goes to the drive, an actual value comes from it; a signal belongs to one telegram.",

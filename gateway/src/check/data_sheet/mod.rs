@@ -268,7 +268,7 @@ impl Device<'_> {
             self.report(problem.help(help), unscaled.first().copied());
         }
         match end {
-            Some(End::Failed(notice)) => self.failed(notice),
+            Some(End::Failed(notice)) => self.failed(*notice),
             Some(End::Made(_, programs)) => {
                 for (axis, program) in numbers.into_iter().zip(programs) {
                     self.parameters(axis, &program);

@@ -38,7 +38,7 @@ pub enum End {
     /// With these PDOs, and the programs of the axes in their order.
     Made(PdoSet, Vec<DriveProgram>),
     /// The device is left out.
-    Failed(Notice),
+    Failed(Box<Notice>),
 }
 
 /// A commissioning by a data sheet.
@@ -89,7 +89,7 @@ pub fn rehearse(
                 }
                 Done::Made(_, Made::Program(_, program, _)) => programs.push(program),
                 Done::Made(_, Made::Pdos(set)) => end = Some(End::Made(set, std::mem::take(&mut programs))),
-                Done::Failed(_, notice) => end = Some(End::Failed(notice)),
+                Done::Failed(_, notice) => end = Some(End::Failed(Box::new(notice))),
                 Done::Told(notice) => told.push(notice),
             }
         }
