@@ -19,7 +19,7 @@ const PAUSE: Duration = Duration::from_millis(6);
 static ALONE: Mutex<()> = Mutex::new(());
 
 /// Runs of a test on a host that pauses in each of them.
-const ATTEMPTS: u32 = 4;
+const ATTEMPTS: u32 = 6;
 
 /// How often the watch looks at the clock.
 const INTERVAL: Duration = Duration::from_millis(2);
@@ -81,7 +81,7 @@ fn longest_pause(stop: &AtomicBool) -> Duration {
     longest
 }
 
-/// Runs a test of processes in real time, alone among those of this program, and again (four runs at most) when it failed while
+/// Runs a test of processes in real time, alone among those of this program, and again (six runs at most) when it failed while
 /// the host paused for 6 ms or more.
 ///
 /// # Panics
