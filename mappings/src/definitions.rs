@@ -45,7 +45,7 @@ pub(super) fn definitions(mapping: &Mapping, table: &AttributeTable) -> Vec<Attr
 }
 
 /// Whether an attribute with this need, a letter for each device function, is required of a device that closes a loop.
-fn requires(need: &str) -> bool {
+pub(crate) fn requires(need: &str) -> bool {
     need.chars().zip("BEFPVT".chars()).any(|(need, function)| need == 'R' && "PVT".contains(function))
 }
 

@@ -17,14 +17,6 @@ pub struct Places {
     pub cia402: Vec<String>,
 }
 
-impl Places {
-    /// Whether neither a controller nor a drive has it.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.cip.is_empty() && self.sercos.is_empty() && self.cia402.is_empty()
-    }
-}
-
 impl Mapping {
     /// Where a parameter of the generic model is.
     #[must_use]
@@ -90,7 +82,6 @@ mod tests {
         let limit = mapping.places_of_parameter(Parameter::ACCELERATION_LIMIT);
         assert_eq!(limit.cip, ["485 Acceleration Limit"]);
         assert_eq!(limit.sercos, ["S-0-0136"]);
-        let none = Places::default();
-        assert!(none.is_empty() && !limit.is_empty());
+        assert_eq!(mapping.places_of_parameter(Parameter::SERIAL_NUMBER), Places::default());
     }
 }

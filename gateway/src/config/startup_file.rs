@@ -45,6 +45,14 @@ struct KeptTable {
     _name: String,
     #[serde(default, rename = "value")]
     _value: String,
+    #[serde(default, rename = "unit")]
+    _unit: String,
+    #[serde(default, rename = "attribute")]
+    _attribute: String,
+    #[serde(default, rename = "minimum")]
+    _minimum: String,
+    #[serde(default, rename = "maximum")]
+    _maximum: String,
     data: Spanned<String>,
 }
 
@@ -214,5 +222,46 @@ impl Loader<'_> {
             self.findings.push(source, Problem::new(code::STARTUP_ODD, first.id.span()).title(title));
         }
         good.then_some(entries)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::param::file::{Backup, Identity, Kept};
+
+    /// Every key that `axisbridge param backup` writes is one that a list may have.
+    #[test]
+    fn what_a_backup_writes_is_a_list() {
+        let drive = Identity([("device_id".to_owned(), "D-1".to_owned())].into());
+        let kept = Kept {
+            id: "S-0-0104".to_owned(),
+            name: "Position loop Kv-factor".to_owned(),
+            value: "1.50".to_owned(),
+            unit: "1000/min".to_owned(),
+            attribute: "0x02110001".to_owned(),
+            minimum: "0.01".to_owned(),
+            maximum: "655.35".to_owned(),
+            data: "9600".to_owned(),
+        };
+        let backup =
+            Backup { parameter: vec![kept], ..Backup::new("turntable", "sercos", "S-0-0192", drive) };
+        let content = backup.to_text().expect("a text");
+        let (source, mut findings) = (Source::new("a.toml", &content), Findings::default());
+        let read = tree(&content, &source, &mut findings)
+            .and_then(|tree| deserialize::<BackupTable>(tree, &source, &mut findings));
+        let mut loader = Loader {
+            text: &source,
+            key: 0..0,
+            bus: "sercos",
+            usual: OnDifference::Warn,
+            findings: &mut findings,
+        };
+        let entries = read.and_then(|table| loader.entries(&source, &table));
+        let entries = entries.unwrap_or_else(|| panic!("{:?}", findings.list()));
+        let ids: Vec<String> = entries.iter().map(|entry| entry.id.to_string()).collect();
+        assert_eq!(ids, ["S-0-1300.0.5", "S-0-0104"]);
+        assert_eq!(entries[1].value, StartupValue::Bytes(vec![0x96, 0]));
+        assert_eq!(entries[1].on_difference, OnDifference::Warn);
     }
 }

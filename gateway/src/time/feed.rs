@@ -106,7 +106,7 @@ pub struct TimeFeed {
     /// System time is the host's clock; otherwise what is told.
     is_host: bool,
     last: Option<(SyncState, SyncQuality)>,
-    /// What the source is told.
+    /// What the source is asked for.
     control: Arc<Control>,
     /// Threshold of the configuration, ns.
     threshold: u64,

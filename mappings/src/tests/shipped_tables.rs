@@ -63,11 +63,6 @@ fn give_the_device_a_table_it_accepts() {
     assert_eq!(row(676).and_then(|row| row.bits), Some(0b11_1110), "Start Inhibits");
 }
 
-/// Device functions that the box offers: position, velocity and torque loop with an encoder.
-fn is_required(need: &str) -> bool {
-    need.chars().zip("BEFPVT".chars()).any(|(need, function)| need == 'R' && "PVT".contains(function))
-}
-
 #[test]
 fn say_of_every_attribute_who_serves_it_or_why_nobody_does() {
     let mapping = shipped();
@@ -92,7 +87,7 @@ fn own_up_to_the_required_attributes_that_nobody_serves() {
     let mut list = String::new();
     for (id, reason) in &mapping.cip.rejected {
         let row = mapping.dictionaries.cip.attribute_by_id(*id).unwrap();
-        if is_required(&row.need) {
+        if crate::definitions::requires(&row.need) {
             list.push_str(&format!("{id} {} ({}): {reason}\n", row.name, row.need));
         }
     }

@@ -17,40 +17,65 @@ const ENTRIES_MAX: usize = 4_096;
 const IDN: &str = "an IDN such as \"S-0-0121\", \"P-0-0123\" or \"S-0-1300.0.3\"";
 const OBJECT: &str = "an object such as \"6091:01\", \"0x6091.1\" or \"2001h\"";
 
+/// An entry as it is written.
+struct Row<'t> {
+    parameter: &'t Spanned<String>,
+    value: &'t Spanned<Scalar>,
+    /// Type of an object.
+    kind: Option<&'t Spanned<String>>,
+    on_difference: Option<&'t Spanned<String>>,
+}
+
 /// The list of a SERCOS drive without its file.
 pub(super) fn sercos(problems: &mut Problems, table: &DriveTable) -> Option<Vec<StartupEntry>> {
     problems.count(&table.startup, "entries of a start-up list", ENTRIES_MAX);
     file(problems, table.startup_file.as_ref());
-    let usual = word(problems, table.on_startup_difference.as_ref(), OnDifference::default());
-    let mut entries = Vec::with_capacity(table.startup.len());
-    for entry in &table.startup {
+    let rows = table.startup.iter().map(|entry| {
         let entry = entry.get_ref();
-        let id = number(problems, &entry.parameter, IDN, |id| matches!(id, Id::Idn(_)));
-        let on_difference = word(problems, entry.on_difference.as_ref(), usual.unwrap_or_default());
-        entries.push(made(id, &entry.value, None, on_difference));
-    }
-    once(problems, table.startup.iter().map(|entry| &entry.get_ref().parameter), &entries);
-    usual.and(entries.into_iter().collect())
+        let (parameter, value, on_difference) = (&entry.parameter, &entry.value, &entry.on_difference);
+        Row { parameter, value, kind: None, on_difference: on_difference.as_ref() }
+    });
+    list(problems, rows, table.on_startup_difference.as_ref(), IDN, |id| matches!(id, Id::Idn(_)))
 }
 
 /// The list of a CANopen drive without its file.
 pub(super) fn can(problems: &mut Problems, table: &CanDriveTable) -> Option<Vec<StartupEntry>> {
     problems.count(&table.startup, "entries of a start-up list", ENTRIES_MAX);
     file(problems, table.startup_file.as_ref());
-    let usual = word(problems, table.on_startup_difference.as_ref(), OnDifference::default());
-    let mut entries = Vec::with_capacity(table.startup.len());
-    for entry in &table.startup {
+    let rows = table.startup.iter().map(|entry| {
         let entry = entry.get_ref();
-        let id = number(problems, &entry.parameter, OBJECT, |id| matches!(id, Id::Object(_)));
-        let on_difference = word(problems, entry.on_difference.as_ref(), usual.unwrap_or_default());
-        let data_type = value::optional(&entry.kind, |word| {
-            value::word(problems, word, "type of an object", Cia402Type::NAMED)
-        });
-        let fits = data_type.flatten().is_none_or(|kind| fits(problems, &entry.value, kind));
-        let made = data_type.and_then(|data_type| made(id, &entry.value, data_type, on_difference));
+        let (parameter, value, on_difference) = (&entry.parameter, &entry.value, &entry.on_difference);
+        Row { parameter, value, kind: entry.kind.as_ref(), on_difference: on_difference.as_ref() }
+    });
+    list(problems, rows, table.on_startup_difference.as_ref(), OBJECT, |id| matches!(id, Id::Object(_)))
+}
+
+/// The entries of a list whose parameters have to look like `expected`.
+fn list<'t>(
+    problems: &mut Problems,
+    rows: impl Iterator<Item = Row<'t>>,
+    usual: Option<&Spanned<String>>,
+    expected: &str,
+    is_of_bus: impl Fn(Id) -> bool,
+) -> Option<Vec<StartupEntry>> {
+    let usual = word(problems, usual, OnDifference::default());
+    let (mut numbers, mut entries) = (Vec::new(), Vec::new());
+    for row in rows {
+        let id = number(problems, row.parameter, expected, &is_of_bus);
+        let on_difference = word(problems, row.on_difference, usual.unwrap_or_default());
+        let data_type =
+            row.kind.map(|word| value::word(problems, word, "type of an object", Cia402Type::NAMED));
+        let fits = data_type.flatten().is_none_or(|kind| fits(problems, row.value, kind));
+        // A word for no type was reported.
+        let made = if data_type == Some(None) {
+            None
+        } else {
+            made(id, row.value, data_type.flatten(), on_difference)
+        };
+        numbers.push(row.parameter);
         entries.push(made.filter(|_| fits));
     }
-    once(problems, table.startup.iter().map(|entry| &entry.get_ref().parameter), &entries);
+    once(problems, &numbers, &entries);
     usual.and(entries.into_iter().collect())
 }
 
@@ -113,12 +138,7 @@ fn fits(problems: &mut Problems, value: &Spanned<Scalar>, kind: Cia402Type) -> b
 }
 
 /// Each parameter is in a list once, however it is written.
-fn once<'t>(
-    problems: &mut Problems,
-    numbers: impl Iterator<Item = &'t Spanned<String>>,
-    entries: &[Option<StartupEntry>],
-) {
-    let numbers: Vec<_> = numbers.collect();
+fn once(problems: &mut Problems, numbers: &[&Spanned<String>], entries: &[Option<StartupEntry>]) {
     for (at, entry) in entries.iter().enumerate() {
         let Some(entry) = entry else { continue };
         let same =
