@@ -247,7 +247,7 @@ fn is_own(index: u16, keeps_mapping: bool) -> bool {
         }
         0x1F50..=0x1F5F | 0x1F80..=0x1F8F => true,
         0x1400..=0x1BFF => !keeps_mapping,
-        0x6000..=0x9FFF => COMMANDS.contains(&(0x6000 + (index - 0x6000) % index::AXIS_OFFSET)),
+        0x6000..=0x9FFF => COMMANDS.contains(&index::on_first_axis(index)),
         _ => false,
     }
 }

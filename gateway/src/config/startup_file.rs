@@ -3,16 +3,13 @@
 //! The entries of a file come first, in its order. An entry of the configuration for the same parameter takes the place of the one of
 //! the file. In front of them stands what makes the drive one of the same type as that of the backup: another one is refused.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
-
-use serde::Deserialize;
 
 use super::Written;
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source, Spanned, deserialize, read_file, tree};
-use crate::parameter::backup::{BYTES_MAX, FORMAT, questions};
+use crate::parameter::backup::{BYTES_MAX, Backup, FORMAT, questions};
 use crate::parameter::id::Id;
 use crate::parameter::startup::{OnDifference, StartupEntry, StartupValue};
 use crate::parameter::value::unhex;
@@ -20,49 +17,8 @@ use crate::parameter::value::unhex;
 /// So many parameters are named in one finding.
 const NAMED_MAX: usize = 8;
 
-/// A backup as it is written.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct BackupTable {
-    format: Spanned<i64>,
-    #[serde(rename = "axis")]
-    _axis: String,
-    bus: Spanned<String>,
-    #[serde(rename = "source")]
-    _source: String,
-    drive: BTreeMap<String, Spanned<String>>,
-    #[serde(default)]
-    parameter: Vec<KeptTable>,
-    #[serde(default)]
-    unread: Vec<UnreadTable>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct KeptTable {
-    id: Spanned<String>,
-    #[serde(default, rename = "name")]
-    _name: String,
-    #[serde(default, rename = "value")]
-    _value: String,
-    #[serde(default, rename = "unit")]
-    _unit: String,
-    #[serde(default, rename = "attribute")]
-    _attribute: String,
-    #[serde(default, rename = "minimum")]
-    _minimum: String,
-    #[serde(default, rename = "maximum")]
-    _maximum: String,
-    data: Spanned<String>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct UnreadTable {
-    id: Spanned<String>,
-    #[serde(rename = "why")]
-    _why: String,
-}
+/// A backup whose texts know their places.
+type BackupTable = Backup<Spanned<String>, Spanned<i64>>;
 
 /// Reads the files that a configuration names; whether all of them can be used. `folder` is where their paths count from.
 pub(super) fn load(folder: &Path, written: &mut Written, findings: &mut Findings) -> bool {
@@ -162,10 +118,10 @@ impl Loader<'_> {
         }
         let mut entries = Vec::with_capacity(table.parameter.len());
         for question in questions(self.bus).iter().filter(|question| question.of_type) {
-            if let (Some(value), Some(id)) = (table.drive.get(question.key), Id::parse(question.id)) {
+            if let (Some(value), Some(id)) = (table.drive.0.get(question.key), Id::parse(question.id)) {
                 entries.push(StartupEntry {
                     id,
-                    value: StartupValue::Text(value.get_ref().clone()),
+                    value: StartupValue::Text(value.clone()),
                     data_type: None,
                     on_difference: OnDifference::Refuse,
                     from_file: true,
@@ -228,7 +184,7 @@ impl Loader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::param::file::{Backup, Identity, Kept};
+    use crate::parameter::backup::{Identity, Kept};
 
     /// Every key that `axisbridge param backup` writes is one that a list may have.
     #[test]

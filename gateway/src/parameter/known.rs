@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use profile_cia402::drive::index::AXIS_OFFSET;
+use profile_cia402::drive::index::{AXIS_OFFSET, on_first_axis};
 use profile_sercos::wire::idn::Idn;
 
 use super::id::Id;
@@ -198,7 +198,7 @@ pub fn rescales(id: Id) -> bool {
         },
         Id::Object(object) => match object.index {
             index @ 0x6000..=0x9FFF => matches!(
-                0x6000 + (index - 0x6000) % AXIS_OFFSET,
+                on_first_axis(index),
                 // Range of positions, polarity; notations and dimensions, resolutions, ratios, feed, factors; units.
                 0x607B | 0x607E | 0x6089..=0x608F | 0x6090..=0x6097 | 0x60A8..=0x60AA | 0x60C2
             ),

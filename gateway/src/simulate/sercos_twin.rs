@@ -7,7 +7,7 @@ use profile_sercos::slave::parameter::Store;
 use profile_sercos::wire::attribute::Attribute;
 use profile_sercos::wire::idn::Idn;
 
-use crate::cli::param::file::{Backup, Kept};
+use crate::parameter::backup::{Backup, Kept, questions};
 use crate::parameter::value::{Kind, unhex};
 
 /// Why there is no drive like that of a file.
@@ -16,26 +16,17 @@ type TwinError = Box<dyn std::error::Error + Send + Sync>;
 /// Settings of a drive: fewer than a slave can have parameters.
 const PARAMETERS_MAX: usize = 3_500;
 
-/// What a drive is called, by the words of a backup.
-const TEXTS: [(&str, Idn); 7] = [
-    ("vendor_name", Idn::structured(1300, 0, 2)),
-    ("device_name", Idn::structured(1300, 0, 4)),
-    ("device_id", Idn::structured(1300, 0, 5)),
-    ("hardware_revision", Idn::structured(1300, 0, 8)),
-    ("software_revision", Idn::structured(1300, 0, 9)),
-    ("firmware", Idn::standard(30)),
-    ("controller_type", Idn::standard(140)),
-];
-
-/// The number of its maker.
+/// The number of its maker: the only answer that is not a text.
 const VENDOR_CODE: Idn = Idn::structured(1300, 0, 3);
+
+/// A twin keeps its own: each drive has another one.
+const SERIAL_NUMBER: Idn = Idn::structured(1300, 0, 12);
 
 /// What a drive is like.
 #[derive(Debug, Clone)]
 pub struct Twin {
     given: Vec<Given>,
-    texts: Vec<(Idn, String)>,
-    vendor: Option<i64>,
+    answers: Vec<(Idn, String)>,
 }
 
 impl Twin {
@@ -65,10 +56,14 @@ impl Twin {
             return Err(format!("expected at most {PARAMETERS_MAX} parameters, got {count}"));
         }
         let given = backup.parameter.iter().map(given).collect::<Result<_, _>>()?;
-        let said = |key: &str| backup.drive.0.get(key);
-        let texts = TEXTS.iter().filter_map(|(key, idn)| Some((*idn, said(key)?.clone()))).collect();
-        let vendor = said("vendor_code").and_then(|text| number(text));
-        Ok(Self { given, texts, vendor })
+        let answers = questions("sercos")
+            .iter()
+            .filter_map(|question| {
+                Some((question.id.parse().ok()?, backup.drive.0.get(question.key)?.clone()))
+            })
+            .filter(|(idn, _)| *idn != SERIAL_NUMBER)
+            .collect();
+        Ok(Self { given, answers })
     }
 
     /// The parameters of the drive.
@@ -79,11 +74,12 @@ impl Twin {
 
     /// Gives a slave what the drive says about itself.
     pub fn name(&self, store: &mut Store) {
-        for (idn, text) in &self.texts {
-            store.set_data_of(*idn, text.as_bytes());
-        }
-        if let Some(vendor) = self.vendor {
-            store.set_number_of(VENDOR_CODE, vendor);
+        for (idn, text) in &self.answers {
+            if *idn != VENDOR_CODE {
+                store.set_data_of(*idn, text.as_bytes());
+            } else if let Some(code) = number(text) {
+                store.set_number_of(VENDOR_CODE, code);
+            }
         }
     }
 }

@@ -113,7 +113,7 @@ pub struct TimeFeed {
 }
 
 impl TimeFeed {
-    /// A feed from what is told; with `is_host` the time is that of the host's clock. `threshold` is that of a clock that no
+    /// A feed from what the source reports; with `is_host` the time is that of the host's clock. `threshold` is that of a clock that no
     /// controller has said another one to, ns.
     #[must_use]
     pub const fn new(

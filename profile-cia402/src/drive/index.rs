@@ -9,6 +9,15 @@ pub const AXIS_OFFSET: u16 = 0x800;
 /// Most axes in a device.
 pub const AXES_MAX: u8 = 8;
 
+/// What an object of whatever axis is on the first one; others stay as they are.
+#[must_use]
+pub const fn on_first_axis(index: u16) -> u16 {
+    match index {
+        0x6000..=0x9FFF => 0x6000 + (index - 0x6000) % AXIS_OFFSET,
+        _ => index,
+    }
+}
+
 /// Bits of 60FDh.
 pub mod input {
     /// Negative limit switch.

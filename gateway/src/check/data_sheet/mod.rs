@@ -9,6 +9,7 @@ mod rehearsal;
 
 use std::ops::Range;
 
+use profile_cia402::drive::index::on_first_axis;
 use profile_cia402::eds::DeviceDescription;
 use profile_cia402::master::config::MasterConfig;
 use profile_cia402::wire::Mux;
@@ -256,9 +257,9 @@ impl Device<'_> {
             self.trouble(trouble);
         }
         self.synchronization(&rehearsal);
-        let Rehearsal { end, told, unscaled } = rehearsal;
-        for notice in told {
-            self.told(notice);
+        let Rehearsal { end, notices, unscaled } = rehearsal;
+        for notice in notices {
+            self.logged(notice);
         }
         if !unscaled.is_empty() {
             let names = listed(unscaled.iter().map(ToString::to_string).collect());
@@ -289,7 +290,7 @@ impl Device<'_> {
         self.report(problem, Some(object));
     }
 
-    /// A device without 1005 follows no SYNC that the file tells of.
+    /// A device without 1005 follows no SYNC, as far as the file says.
     fn synchronization(&mut self, rehearsal: &Rehearsal) {
         let object = Mux::new(profile_cia402::drive::index::COB_ID_SYNC, 0);
         let Err(code) = self.description().look_up(object) else { return };
@@ -327,11 +328,11 @@ impl Device<'_> {
         };
         let title = format!("the axis cannot work with the drive of this data sheet: {text}");
         let problem = Problem::new(code, self.axis_span(axis, about_modes)).title(title);
-        self.report(problem.help("node is left out at start".replace("node", "the device")), object);
+        self.report(problem.help("the device is left out at start"), object);
     }
 
     /// What the gateway would log while it commissions the device.
-    fn told(&mut self, notice: Notice) {
+    fn logged(&mut self, notice: Notice) {
         match notice {
             Notice::ModesTried { axis, .. } => {
                 let problem = Problem::new(code::SHEET_SILENT, self.axis_span(axis, true))
@@ -378,7 +379,7 @@ impl Device<'_> {
         for failure in failures.iter().filter(|failure| failure.what == "writing") {
             let problem = Problem::new(code::SHEET_WITHOUT, self.axis_span(axis, false));
             let problem = problem.title(format!("commissioning goes on without {failure}"));
-            let is_period = rehearsal::on_first_axis(failure.object.index) == 0x60C2;
+            let is_period = on_first_axis(failure.object.index) == 0x60C2;
             let help = if is_period {
                 "set the interpolation time of the drive to `cycle_time` with the maker's tool"
             } else {

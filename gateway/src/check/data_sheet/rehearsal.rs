@@ -47,7 +47,7 @@ pub struct Rehearsal {
     /// How it ended; `None` where it came to no end.
     pub end: Option<End>,
     /// What the gateway would log.
-    pub told: Vec<Notice>,
+    pub notices: Vec<Notice>,
     /// Objects of the scaling whose values the file does not give.
     pub unscaled: BTreeSet<Mux>,
 }
@@ -72,7 +72,7 @@ pub fn rehearse(
     let number = |sub| description.number(index::IDENTITY, sub, device.node);
     let identity = DriveIdentity { vendor: number(1), product: number(2) };
     let run = Run::new(0, 1);
-    let mut told = Vec::new();
+    let mut notices = Vec::new();
     let mut programs = Vec::new();
     let mut end = None;
     // An empty queue has room for two.
@@ -81,7 +81,7 @@ pub fn rehearse(
     while end.is_none() {
         commissioner.poll();
         let mut is_over = true;
-        while let Some((run, done)) = handle.pop(&mut |notice| told.push(notice)) {
+        while let Some((run, done)) = handle.pop(&mut |notice| notices.push(notice)) {
             is_over = false;
             match done {
                 Done::Submit(_, request) => {
@@ -90,22 +90,14 @@ pub fn rehearse(
                 Done::Made(_, Made::Program(_, program, _)) => programs.push(program),
                 Done::Made(_, Made::Pdos(set)) => end = Some(End::Made(set, std::mem::take(&mut programs))),
                 Done::Failed(_, notice) => end = Some(End::Failed(Box::new(notice))),
-                Done::Told(notice) => told.push(notice),
+                Done::Told(notice) => notices.push(notice),
             }
         }
         if is_over {
             break;
         }
     }
-    Rehearsal { end, told, unscaled: device.unscaled }
-}
-
-/// The object that one of another axis is on the first one.
-pub fn on_first_axis(index: u16) -> u16 {
-    match index {
-        0x6000..=0x9FFF => 0x6000 + (index - 0x6000) % index::AXIS_OFFSET,
-        _ => index,
-    }
+    Rehearsal { end, notices, unscaled: device.unscaled }
 }
 
 /// A device that answers by its data sheet.
@@ -138,7 +130,7 @@ impl Answers<'_> {
         if let Some(bytes) = self.written.get(&object).or_else(|| self.modes.get(&object.index)) {
             return Ok(bytes.clone());
         }
-        let index = on_first_axis(object.index);
+        let index = index::on_first_axis(object.index);
         let is_factor = SCALING.contains(&index) && object.sub > 0;
         // A factor of 0 is one that the file does not say.
         if let Some(bytes) = said.filter(|bytes| !is_factor || bytes.iter().any(|byte| *byte != 0)) {
@@ -157,7 +149,7 @@ impl Answers<'_> {
     fn write(&mut self, object: Mux, bytes: &[u8]) -> Result<(), AbortCode> {
         self.description.takes(object, bytes, self.node)?;
         self.written.insert(object, bytes.to_vec());
-        if on_first_axis(object.index) == index::MODE {
+        if index::on_first_axis(object.index) == index::MODE {
             self.modes.insert(object.index + (index::MODE_DISPLAY - index::MODE), bytes.to_vec());
         }
         Ok(())

@@ -4,9 +4,9 @@ use std::process::ExitCode;
 
 use super::BackupArguments;
 use super::drive::{Drive, Found};
-use super::file::{Backup, Identity, Kept, Unread};
 use crate::cli::CliError;
 use crate::cli::progress::Progress;
+use crate::parameter::backup::{Backup, Identity, Kept, Unread};
 
 /// Reads all parameters of the backup list and writes them to the file.
 ///

@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use super::CompareArguments;
 use super::drive::{Drive, Found};
-use super::file::{Backup, Kept};
 use super::show;
 use crate::cli::progress::Progress;
 use crate::cli::{CliError, print};
 use crate::local::protocol::printable;
+use crate::parameter::backup::{Backup, Kept};
 
 /// A parameter in which the drive and the backup differ.
 #[derive(Debug, PartialEq, Eq, Serialize)]

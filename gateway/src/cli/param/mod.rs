@@ -3,7 +3,7 @@
 mod backup;
 mod compare;
 mod drive;
-pub(crate) mod file;
+mod file;
 mod restore;
 mod show;
 

@@ -9,11 +9,11 @@ use std::process::ExitCode;
 use super::RestoreArguments;
 use super::compare::differences;
 use super::drive::{Drive, Found, Refused};
-use super::file::{Backup, Kept};
 use super::show;
 use crate::cli::CliError;
 use crate::cli::progress::Progress;
 use crate::local::protocol::printable;
+use crate::parameter::backup::{Backup, Kept};
 
 /// Times that what was refused is tried, at most.
 const PASSES_MAX: usize = 8;

@@ -1,7 +1,7 @@
 //! The start-up lists of drives, as far as they can be judged without tables: numbers, words, values of a type, each parameter once.
 
 use super::{Problems, value};
-use crate::config::file::{CanDriveTable, DriveTable};
+use crate::config::file::{CanDriveTable, DriveTable, ObjectStartupTable, StartupTable};
 use crate::config::scalar::Scalar;
 use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
@@ -26,41 +26,47 @@ struct Row<'t> {
     on_difference: Option<&'t Spanned<String>>,
 }
 
+impl<'t> From<&'t StartupTable> for Row<'t> {
+    fn from(StartupTable { parameter, value, on_difference }: &'t StartupTable) -> Self {
+        Row { parameter, value, kind: None, on_difference: on_difference.as_ref() }
+    }
+}
+
+impl<'t> From<&'t ObjectStartupTable> for Row<'t> {
+    fn from(ObjectStartupTable { parameter, value, kind, on_difference }: &'t ObjectStartupTable) -> Self {
+        Row { parameter, value, kind: kind.as_ref(), on_difference: on_difference.as_ref() }
+    }
+}
+
 /// The list of a SERCOS drive without its file.
 pub(super) fn sercos(problems: &mut Problems, table: &DriveTable) -> Option<Vec<StartupEntry>> {
-    problems.count(&table.startup, "entries of a start-up list", ENTRIES_MAX);
     file(problems, table.startup_file.as_ref());
-    let rows = table.startup.iter().map(|entry| {
-        let entry = entry.get_ref();
-        let (parameter, value, on_difference) = (&entry.parameter, &entry.value, &entry.on_difference);
-        Row { parameter, value, kind: None, on_difference: on_difference.as_ref() }
-    });
-    list(problems, rows, table.on_startup_difference.as_ref(), IDN, |id| matches!(id, Id::Idn(_)))
+    let usual = table.on_startup_difference.as_ref();
+    list(problems, &table.startup, usual, IDN, |id| matches!(id, Id::Idn(_)))
 }
 
 /// The list of a CANopen drive without its file.
 pub(super) fn can(problems: &mut Problems, table: &CanDriveTable) -> Option<Vec<StartupEntry>> {
-    problems.count(&table.startup, "entries of a start-up list", ENTRIES_MAX);
     file(problems, table.startup_file.as_ref());
-    let rows = table.startup.iter().map(|entry| {
-        let entry = entry.get_ref();
-        let (parameter, value, on_difference) = (&entry.parameter, &entry.value, &entry.on_difference);
-        Row { parameter, value, kind: entry.kind.as_ref(), on_difference: on_difference.as_ref() }
-    });
-    list(problems, rows, table.on_startup_difference.as_ref(), OBJECT, |id| matches!(id, Id::Object(_)))
+    let usual = table.on_startup_difference.as_ref();
+    list(problems, &table.startup, usual, OBJECT, |id| matches!(id, Id::Object(_)))
 }
 
 /// The entries of a list whose parameters have to look like `expected`.
-fn list<'t>(
+fn list<'t, T>(
     problems: &mut Problems,
-    rows: impl Iterator<Item = Row<'t>>,
+    startup: &'t [Spanned<T>],
     usual: Option<&Spanned<String>>,
     expected: &str,
     is_of_bus: impl Fn(Id) -> bool,
-) -> Option<Vec<StartupEntry>> {
+) -> Option<Vec<StartupEntry>>
+where
+    Row<'t>: From<&'t T>,
+{
+    problems.count(startup, "entries of a start-up list", ENTRIES_MAX);
     let usual = word(problems, usual, OnDifference::default());
     let (mut numbers, mut entries) = (Vec::new(), Vec::new());
-    for row in rows {
+    for row in startup.iter().map(|entry| Row::from(entry.get_ref())) {
         let id = number(problems, row.parameter, expected, &is_of_bus);
         let on_difference = word(problems, row.on_difference, usual.unwrap_or_default());
         let data_type =
@@ -158,7 +164,7 @@ mod tests {
     use super::super::checked;
     use super::*;
 
-    fn told<T: std::fmt::Debug>(checked: Result<T, Vec<String>>) -> Vec<String> {
+    fn titles<T: std::fmt::Debug>(checked: Result<T, Vec<String>>) -> Vec<String> {
         checked.map(|_| Vec::new()).unwrap_or_else(|titles| titles)
     }
 
@@ -205,7 +211,7 @@ mod tests {
                 "unknown reaction to a difference `ignore`",
             ),
         ] {
-            assert_eq!(told(of_sercos(&entry(parameter, rest))), [expected]);
+            assert_eq!(titles(of_sercos(&entry(parameter, rest))), [expected]);
         }
         for (parameter, rest, expected) in [
             ("6091", "value = 1", "`6091` is not the number of a parameter"),
@@ -214,12 +220,12 @@ mod tests {
             ("6091:01", "value = 256\ntype = \"u8\"", "the value is not a u8"),
             ("6091:01", "value = 1.5\ntype = \"u32\"", "the value is not a u32"),
         ] {
-            assert_eq!(told(of_can(&entry(parameter, rest))), [expected]);
+            assert_eq!(titles(of_can(&entry(parameter, rest))), [expected]);
         }
         let twice = format!("{}{}", entry("S-0-0121", "value = 1"), entry("s-0-121", "value = 2"));
-        assert_eq!(told(of_sercos(&twice)), ["the parameter S-0-0121 is used twice"]);
+        assert_eq!(titles(of_sercos(&twice)), ["the parameter S-0-0121 is used twice"]);
         assert_eq!(
-            told(of_sercos("startup_file = \"\"")),
+            titles(of_sercos("startup_file = \"\"")),
             ["the path of the start-up list of a drive is empty"]
         );
     }

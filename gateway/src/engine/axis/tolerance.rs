@@ -27,7 +27,7 @@ pub(super) struct ToleranceWatch {
 }
 
 impl ToleranceWatch {
-    /// Which of them have been passed for too long by now. `error` and `torque` are those of an axis that is led, where they are known.
+    /// Which of them have been passed for too long by now. `error` and `torque` are those of an axis under control, where they are known.
     pub fn look(
         &mut self,
         now: MonotonicTime,
@@ -97,7 +97,7 @@ mod tests {
             assert_eq!(passed[0].0, FaultCause::EXCESSIVE_VELOCITY_ERROR);
             assert_eq!(passed[1].0, FaultCause::OVER_TORQUE);
         }
-        // The axis is not led, or the drive does not report its torque: the time begins anew.
+        // The axis is not controlled, or the drive does not report its torque: the time begins anew.
         let passed = watch.look(at(44), &tolerances, None, None);
         assert_eq!(passed.map(|(_, is_there)| is_there), [false, false]);
         let passed = watch.look(at(45), &tolerances, Some(Velocity(9 * UNIT)), Some(Torque(900_000)));

@@ -5,6 +5,8 @@
 //! say, or gives as 0, with which no axis could move (accelerations, factors, windows): there the simulated drive's are kept, in
 //! the units of the file. What a count is follows from the objects that the file has, as the standard has it.
 
+use profile_generic::ratio::Ratio;
+
 use crate::drive::index::*;
 use crate::drive::modes::SupportedModes;
 use crate::eds::{self, DeviceDescription, SubObject};
@@ -204,7 +206,7 @@ fn definition(
 
 /// Whether 0 in a value of the first or a further axis keeps it from moving.
 fn is_needed(index: u16, sub: u8) -> bool {
-    let on_first = if index >= 0x6000 { 0x6000 + (index - 0x6000) % AXIS_OFFSET } else { index };
+    let on_first = on_first_axis(index);
     on_first == ENCODER_RESOLUTION && sub > 0
         || VALUES.iter().any(|(known, known_sub, _)| (*known, *known_sub) == (on_first, sub))
 }
@@ -285,12 +287,9 @@ fn scale(dictionary: &mut Dictionary, sheet: &DeviceDescription, axis: u16) {
 }
 
 /// The same ratio in numbers of 31 bits, as near as they come.
-fn reduced(mut upper: i64, mut lower: i64) -> (i64, i64) {
-    let (mut a, mut b) = (upper.max(1), lower.max(1));
-    while b != 0 {
-        (a, b) = (b, a % b);
-    }
-    (upper, lower) = (upper.max(1) / a, lower.max(1) / a);
+fn reduced(upper: i64, lower: i64) -> (i64, i64) {
+    let ratio = Ratio::new(upper.max(1), lower.max(1)).unwrap_or(Ratio::ONE);
+    let (mut upper, mut lower) = (ratio.num(), ratio.den());
     while upper > i64::from(i32::MAX) || lower > i64::from(i32::MAX) {
         (upper, lower) = ((upper / 2).max(1), (lower / 2).max(1));
     }
