@@ -8,7 +8,8 @@
 //! ```
 //!
 //! The line runs through the last [`WINDOW`] Syncs. A value far off it is put aside until the next ones agree with it: then the
-//! master's clock has stepped, the line begins anew there, and keeps its rate. Everything is integer nanoseconds.
+//! master's clock has stepped, the line begins anew there, and keeps its rate. If they agree on a line of another rate, the master's
+//! frequency has stepped, and the line begins anew with that. Everything is integer nanoseconds.
 
 use arrayvec::ArrayVec;
 use profile_generic::time::{MonotonicTime, SystemTime};
@@ -82,6 +83,13 @@ struct Point {
     phase: i64,
 }
 
+impl Point {
+    /// Time and phase from another point on, ns: small numbers, whatever the clocks say.
+    fn relative_to(self, origin: Self) -> (i128, i128) {
+        (i128::from(self.at.since(origin.at).0), i128::from(self.phase.saturating_sub(origin.phase)))
+    }
+}
+
 /// See the module.
 #[derive(Debug, Clone, Default)]
 pub struct Line {
@@ -103,9 +111,10 @@ impl Line {
         Self { delays: ArrayVec::from_iter([0; DELAYS_MIN]), ..Self::default() }
     }
 
-    /// Another master is followed: nothing is known but the rate of our own clock, which changes little.
+    /// Another master is followed: nothing is known. The rate so far is the best guess until its own is measured; two masters may be
+    /// as far apart as their crystals.
     pub fn begin_anew(&mut self) {
-        *self = Self { rate_ppb: self.rate_ppb, rate_is_known: self.rate_is_known, ..Self::default() };
+        *self = Self { rate_ppb: self.rate_ppb, ..Self::default() };
     }
 
     /// The way to the same time is another one: its delay is not known yet.
@@ -133,19 +142,30 @@ impl Line {
             offset.abs_diff(there) <= self.odd()
         };
         let stepped = self.aside.len() >= STEP_VALUES - 1 && agreed.into_iter().all(agree);
-        if !stepped && self.aside.len() + 1 < PUT_ASIDE_MAX {
+        let kept = if stepped {
+            STEP_VALUES - 1
+        } else if self.is_of_another_rate(point) {
+            RATE_MIN - 1
+        } else if self.aside.len() + 1 < PUT_ASIDE_MAX {
             self.aside.push(point);
             return Taken::PutAside { offset };
-        }
-        let kept = if stepped {
-            self.aside.iter().rev().take(STEP_VALUES - 1).rev().copied().collect()
         } else {
-            ArrayVec::new()
+            0
         };
-        self.points = kept;
+        self.points = self.aside.iter().skip(self.aside.len().saturating_sub(kept)).copied().collect();
         self.aside.clear();
+        self.rate_is_known &= stepped;
         self.keep(point);
         Taken::Stepped { by: offset }
+    }
+
+    /// Whether this value and the last ones put aside are on one line, whatever its rate.
+    fn is_of_another_rate(&self, point: Point) -> bool {
+        let before = self.aside.iter().rev().take(RATE_MIN - 1).rev();
+        let points: ArrayVec<_, RATE_MIN> =
+            before.chain([&point]).map(|other| other.relative_to(point)).collect();
+        let fitted = Fit::through(&points, self.rate_ppb);
+        fitted.has_rate && points.iter().all(|point| fitted.off(*point) <= self.odd())
     }
 
     /// Takes a delay request that left at `at`; `phase` is the time at which the master got it less that time, ns.
@@ -177,7 +197,7 @@ impl Line {
         sorted.get(sorted.len() / 2).copied()
     }
 
-    /// Whether the rate comes from measurements, of this master or the one before.
+    /// Whether the rate comes from measurements of this master.
     #[must_use]
     pub const fn rate_is_known(&self) -> bool {
         self.rate_is_known
@@ -230,15 +250,8 @@ impl Line {
     /// the mean.
     fn fit(&mut self) {
         let Some(last) = self.points.last().copied() else { return };
-        // Times and phases from the last point on: small numbers, whatever the clocks say.
-        let mut relative: ArrayVec<(i128, i128), WINDOW> = self
-            .points
-            .iter()
-            .map(|point| {
-                let phase = point.phase.saturating_sub(last.phase);
-                (i128::from(point.at.since(last.at).0), i128::from(phase))
-            })
-            .collect();
+        let mut relative: ArrayVec<(i128, i128), WINDOW> =
+            self.points.iter().map(|point| point.relative_to(last)).collect();
         loop {
             let fitted = Fit::through(&relative, self.rate_ppb);
             let off = |point: &(i128, i128)| fitted.off(*point);
@@ -438,21 +451,46 @@ mod tests {
     }
 
     #[test]
-    fn another_master_begins_anew_with_the_rate() {
-        let master = Master { ppb: 40_000, delay: 3_000, noise: [0; 3], ahead: 0 };
-        let mut line = Line::default();
-        for number in 0..20 {
-            master.run(&mut line, number);
+    fn another_master_begins_anew_and_its_rate_is_measured() {
+        for ppb in [40_000, 0, -60_000, 240_000] {
+            let master = Master { ppb: 40_000, delay: 3_000, noise: [0; 3], ahead: 0 };
+            let mut line = Line::default();
+            for number in 0..20 {
+                master.run(&mut line, number);
+            }
+            line.begin_anew();
+            assert_eq!((line.mean_path_delay(), line.sample(MonotonicTime(30 * SECOND))), (None, None));
+            assert_eq!((line.rate_is_known(), line.rate_ppb()), (false, 40_000));
+            let other = Master { ahead: 300_000, ppb, ..master };
+            assert_eq!(other.run(&mut line, 20), Taken::First);
+            for number in 21..27 {
+                assert!(matches!(other.run(&mut line, number), Taken::Near { .. }), "{ppb}: {number}");
+            }
+            assert!(line.rate_is_known() && (line.rate_ppb() - ppb).abs() <= 1, "{ppb}");
+            let off = error(&line, &other, MonotonicTime(37 * SECOND));
+            assert!(off.abs() < 30, "{ppb}: {off} ns");
         }
-        line.begin_anew();
-        assert_eq!((line.mean_path_delay(), line.sample(MonotonicTime(30 * SECOND))), (None, None));
-        assert!(line.rate_is_known());
-        let other = Master { ahead: 300_000, ..master };
-        assert_eq!(other.run(&mut line, 20), Taken::First);
-        for number in 21..24 {
-            assert!(matches!(other.run(&mut line, number), Taken::Near { .. }));
+    }
+
+    #[test]
+    fn another_rate_of_the_same_master_is_taken_when_four_values_are_on_its_line() {
+        for change in [40_000, -100_000, 200_000] {
+            let mut master = Master { ppb: 40_000, delay: 3_000, noise: [0; 3], ahead: 0 };
+            let mut line = Line::default();
+            for number in 0..20 {
+                master.run(&mut line, number);
+            }
+            // From number 19 on.
+            master.ahead -= 19 * change;
+            master.ppb += change;
+            let taken: Vec<_> = (20..24).map(|number| master.run(&mut line, number)).collect();
+            assert!(taken[..3].iter().all(|taken| matches!(taken, Taken::PutAside { .. })), "{taken:?}");
+            let Taken::Stepped { by } = taken[3] else { panic!("{change}: {taken:?}") };
+            assert!((by - 4 * change).abs() < 100, "{change}: {by}");
+            assert!((line.rate_ppb() - master.ppb).abs() <= 1, "{change}: {}", line.rate_ppb());
+            let off = error(&line, &master, MonotonicTime(40 * SECOND));
+            assert!(off.abs() < 100, "{change}: {off} ns");
         }
-        assert!(error(&line, &other, MonotonicTime(34 * SECOND)).abs() < 30);
     }
 
     proptest::proptest! {

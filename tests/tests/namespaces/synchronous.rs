@@ -36,10 +36,6 @@ use super::{in_namespace, one_bus, scratch};
 const GATEWAY: &str = "192.168.40.3";
 const CONTROLLER: &str = "192.168.40.2";
 
-/// The relay's delay grows by one part in so many, 50 us in a second: a sudden one is taken for a step of the master, and that is
-/// another phase.
-const RAMP: u32 = 20_000;
-
 /// Set for the copy of this test binary that is the relay.
 const RELAY: &str = "AXISBRIDGE_TEST_RELAY";
 
@@ -110,15 +106,20 @@ struct Pace {
     log_announce: i8,
     log_sync: i8,
     phase: Duration,
+    /// The relay's delay grows by one part in so many, 12.5 us from Sync to Sync: a sudden one is taken for a step of the master, and
+    /// that is another phase.
+    ramp: u32,
     /// How long the axes move: as long as all phases.
     motion: u32,
 }
 
 /// As CIP Sync does.
-const CIP_SYNC: Pace = Pace { log_announce: 1, log_sync: 0, phase: Duration::from_secs(60), motion: 420 };
+const CIP_SYNC: Pace =
+    Pace { log_announce: 1, log_sync: 0, phase: Duration::from_secs(60), ramp: 80_000, motion: 420 };
 
 /// Four times as often, for a short test.
-const FAST: Pace = Pace { log_announce: -1, log_sync: -2, phase: Duration::from_secs(3), motion: 30 };
+const FAST: Pace =
+    Pace { log_announce: -1, log_sync: -2, phase: Duration::from_secs(3), ramp: 20_000, motion: 30 };
 
 /// A machine on the switch, at interface `net0`; behind the relay, `through` is its namespace.
 fn plug(switch: &Namespace, role: &str, address: &str) -> Namespace {
@@ -350,8 +351,8 @@ fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
         });
 
         phase(&mut plant, ASYMMETRY, &mut |plant, before| {
-            writeln!(tell_relay, "100 20").expect("the relay listens");
-            std::thread::sleep(Duration::from_secs(4));
+            writeln!(tell_relay, "100 20 {}", pace.ramp).expect("the relay listens");
+            std::thread::sleep(Duration::from_secs(4).max(pace.phase / 2));
             let end = Instant::now() + Duration::from_secs(10);
             while !is_synchronized(&plant.text()[before.len()..]) && Instant::now() < end {
                 std::thread::sleep(Duration::from_millis(50));
@@ -522,7 +523,8 @@ fn ptp_is_told_as_it_should(capture: &Path) {
 }
 
 /// Not a test of its own: passes IPv4 frames between two interfaces. A line of its input sets by how many microseconds longer frames
-/// take towards the second one, reached at [`RAMP`], and how many of a hundred are lost in both directions. It ends with its input.
+/// take towards the second one, how many of a hundred are lost in both directions, and by one part in how many of the time the delay
+/// grows. It ends with its input.
 #[test]
 fn relay() {
     let Ok(interfaces) = std::env::var(RELAY) else { return };
@@ -537,17 +539,18 @@ fn relay() {
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
             let numbers: Vec<u64> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
-            if let [delay, loss] = numbers[..] {
-                let _ = sender.send((Duration::from_micros(delay), loss));
+            if let [delay, loss, ramp] = numbers[..] {
+                let _ = sender.send((Duration::from_micros(delay), loss, u32::try_from(ramp).unwrap_or(1)));
             }
         }
         drop(sender);
     });
-    let (mut delay, mut loss, mut passed, mut set_at) = (Duration::ZERO, 0, 0_u64, Instant::now());
+    let (mut delay, mut loss, mut ramp, mut passed, mut set_at) =
+        (Duration::ZERO, 0, 1, 0_u64, Instant::now());
     let mut buffer = [0; 2048];
     loop {
         match settings.try_recv() {
-            Ok(set) => ((delay, loss), set_at) = (set, Instant::now()),
+            Ok(set) => ((delay, loss, ramp), set_at) = (set, Instant::now()),
             Err(std::sync::mpsc::TryRecvError::Disconnected) => return,
             Err(std::sync::mpsc::TryRecvError::Empty) => {}
         }
@@ -560,7 +563,7 @@ fn relay() {
                 if passed.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32 & 0xFFFF < loss * 0xFFFF / 100 {
                     continue;
                 }
-                let delay = delay.min(set_at.elapsed() / RAMP);
+                let delay = delay.min(set_at.elapsed() / ramp);
                 while from == 0 && begun.elapsed() < delay {}
                 let frame = &mut buffer[..received.len];
                 // The checksum of a datagram is left to the network card, which a virtual cable has none of: there is none (RFC 768).

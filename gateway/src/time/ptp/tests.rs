@@ -31,6 +31,8 @@ struct Clock {
     /// How far it is ahead of the time of the test, ns: from second .0 on, .1.
     ahead: i128,
     step: Option<(u64, i128)>,
+    /// From second .0 on its rate is another one by .1.
+    rate_step: Option<(u64, i128)>,
     /// Delay of the way from it, and of the way to it, ns.
     delays: (u64, u64),
     two_step: bool,
@@ -50,6 +52,7 @@ const MASTER: Clock = Clock {
     ppb: 40_000,
     ahead: 4_000_000,
     step: None,
+    rate_step: None,
     delays: (3_000, 3_000),
     two_step: true,
     announces: true,
@@ -63,7 +66,11 @@ impl Clock {
     fn time(&self, at: u64) -> u64 {
         let since = i128::from(at) - i128::from(START);
         let step = self.step.filter(|(second, _)| at >= START + second * SECOND).map_or(0, |(_, step)| step);
-        u64::try_from(EPOCH + since + since * self.ppb / 1_000_000_000 + self.ahead + step).unwrap()
+        let changed = self.rate_step.map_or(0, |(second, ppb)| {
+            i128::from(at.saturating_sub(START + second * SECOND)) * ppb / 1_000_000_000
+        });
+        let gained = since * self.ppb / 1_000_000_000 + changed;
+        u64::try_from(EPOCH + since + gained + self.ahead + step).unwrap()
     }
 }
 
@@ -305,6 +312,31 @@ fn a_better_clock_is_followed_and_samples_of_two_are_never_mixed() {
     assert_eq!(status.steps, 0, "no step: another clock");
     assert!(error(&status, &better).abs() < 50, "{}", error(&status, &better));
     assert!((status.mean_path_delay.unwrap() - 3_000).abs() < 5);
+}
+
+#[test]
+fn a_better_clock_of_another_rate_is_followed() {
+    for ppb in [0, 15_000, 80_000, -100_000, 200_000] {
+        let better = Clock { identity: 2, priority: 100, there: (30, u64::MAX), ppb, ..MASTER };
+        let (run, status) = run(Network::new(&[MASTER, better], 70));
+        assert_eq!((status.phase, status.steps), (SyncPhase::Synchronized, 0), "{ppb}: {run:?}");
+        assert!(run.last().unwrap().0 <= 55, "{ppb}: {run:?}");
+        assert!(error(&status, &better).abs() < 50, "{ppb}: {}", error(&status, &better));
+        assert!((status.sample.unwrap().rate_ppb - i64::try_from(ppb).unwrap()).abs() <= 1);
+        assert!((status.mean_path_delay.unwrap() - 3_000).abs() < 5, "{ppb}");
+    }
+}
+
+#[test]
+fn a_master_that_changes_its_rate_is_followed() {
+    for by in [15_000, 40_000, -80_000, 150_000] {
+        let master = Clock { rate_step: Some((30, by)), ..MASTER };
+        let (run, status) = run(Network::new(&[master], 70));
+        assert_eq!(status.phase, SyncPhase::Synchronized, "{by}: {run:?}");
+        assert!(run.last().unwrap().0 <= 50, "{by}: {run:?}");
+        assert!(error(&status, &master).abs() < 50, "{by}: {}", error(&status, &master));
+        assert!((status.sample.unwrap().rate_ppb - 40_000 - i64::try_from(by).unwrap()).abs() <= 1);
+    }
 }
 
 #[test]
