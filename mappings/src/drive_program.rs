@@ -365,12 +365,20 @@ impl DriveProgram {
         }
     }
 
-    /// Whether the gateway can go by a parameter itself that the drive lacks. A limit of the torque takes a drive that reports its torque.
+    /// Whether the gateway can go by a parameter itself that the drive lacks: a watched torque has to be reported, a Stopping Torque takes
+    /// limits to compare it with.
     #[must_use]
     pub fn can_go_by(&self, parameter: Parameter) -> bool {
-        let is_torque =
-            [Parameter::OVER_TORQUE_LIMIT, Parameter::OVER_TORQUE_LIMIT_TIME].contains(&parameter);
-        !is_torque || self.feedback.fields().any(|field| field.signal == Signal::TorqueActual)
+        match parameter {
+            Parameter::OVER_TORQUE_LIMIT | Parameter::OVER_TORQUE_LIMIT_TIME => {
+                self.feedback.fields().any(|field| field.signal == Signal::TorqueActual)
+            }
+            Parameter::STOPPING_TORQUE => {
+                let limits = [Parameter::TORQUE_LIMIT_POSITIVE, Parameter::TORQUE_LIMIT_NEGATIVE];
+                limits.iter().all(|limit| self.parameter(*limit).is_some())
+            }
+            _ => true,
+        }
     }
 
     /// Whether the gateway knows the loops of the drive by its profile: it has parameters.

@@ -127,7 +127,7 @@ impl Mapping {
             }
             (None, Missing::Zero) => (Truth::Absent, format!("the drive has no {name}")),
             (None, Missing::Device) if !drive.can_go_by(parameter) => {
-                (Truth::Absent, "the drive does not report what it is a limit of".to_owned())
+                (Truth::Absent, "the drive does not show what it goes by".to_owned())
             }
             (None, Missing::Device) if parameter == Parameter::STOPPING_TORQUE => {
                 (Truth::Compared, "the torque limits of the drive".to_owned())

@@ -222,6 +222,11 @@ impl Plant {
     }
 }
 
+/// Whether an axis or the device had a fault.
+fn is_faulted(log: &str) -> bool {
+    log.contains("fault action") || log.replace("No Fault (0)", "").contains("Fault (")
+}
+
 /// Whether the last of these lines of a log about time says that it is synchronized, or there are none.
 fn is_synchronized(log: &str) -> bool {
     let last = log.lines().rfind(|line| line.contains("system time: "));
@@ -360,7 +365,7 @@ fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
         });
 
         assert!(controller.ended().is_none(), "the axes have moved all the time");
-        let status = controller.wait(Duration::from_secs(90));
+        let status = controller.wait(Duration::from_secs(u64::from(pace.motion) + 60));
         assert!(
             status.success(),
             "{status}: {}\n{}",
@@ -378,13 +383,15 @@ fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
         for (title, text) in &phases {
             println!("---- {title}\n{text}");
         }
-        assert!(!log.contains("fault action") && !log.contains("Fault ("), "{log}");
+        assert!(!is_faulted(&log), "{log}");
         no_jump(&capture, 4_000, 2_000);
         for (title, text) in phases {
             assert!(is_synchronized(&text), "{title}: {text}");
-            // An alarm is due at a change of the grandmaster, and ten seconds after the loss of time (IEC 61800-7-202, 6.5.4).
+            // An alarm is due at a change of the grandmaster, and ten seconds after the loss of time (IEC 61800-7-202, 6.5.4). At a Sync
+            // each second it takes eight Syncs behind a step to be synchronized again.
             let alarms = text.matches("Clock Sync Alarm").count();
-            let most = if title == BETTER { 1 } else { 0 };
+            let is_slow = pace.log_sync >= 0;
+            let most = if title == BETTER || title == STEP && is_slow { 1 } else { 0 };
             assert!(alarms <= most, "{title}: {text}");
         }
     });
@@ -453,7 +460,7 @@ fn a_controller_that_is_the_grandmaster_moves_the_axes_of_its_follower() {
 
         let gateway_capture = plant.capture.clone();
         let log = plant.end();
-        assert!(!log.contains("fault action") && !log.contains("Fault ("), "{log}");
+        assert!(!is_faulted(&log), "{log}");
         no_jump(&gateway_capture, 300, 400);
         ptp_is_told_as_it_should(&capture);
         // What ptp4l measures is the clock of the controller against the host's.

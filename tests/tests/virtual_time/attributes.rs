@@ -5,9 +5,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use axisbridge::config::Config;
-use axisbridge::mapping::{Access, CipAttribute, CipType, Mapping, Served, SetKind, Truth};
-use axisbridge::translate::Stage;
+use axisbridge::mapping::{Access, CipAttribute, CipType, Mapping, Served, SetKind};
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{NANO, millis};
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
@@ -324,101 +322,6 @@ fn what_is_always_so_can_be_set_to_nothing_else() {
     ] {
         assert_eq!((set(id, &[always]), set(id, &[other])), (OK, INVALID_VALUE), "{name}");
     }
-}
-
-/// Another value of an attribute, near the one that it has; `None` for what is no number.
-fn another(row: &CipAttribute, value: &[u8]) -> Option<Vec<u8>> {
-    if row.length.is_some() || row.data_type == CipType::ShortString {
-        return None;
-    }
-    let mut other = value.to_vec();
-    match (row.data_type, value) {
-        (CipType::Real, &[a, b, c, d]) => {
-            let before = f32::from_le_bytes([a, b, c, d]);
-            let near = if before == 0.0 { 1_000.0 } else { before * 0.9 };
-            other.copy_from_slice(&near.to_le_bytes());
-        }
-        _ => *other.first_mut()? ^= 1,
-    }
-    Some(other)
-}
-
-/// Whether a value is the new one and not the old one: drives round reals to steps of their own.
-fn is_near(row: &CipAttribute, now: &[u8], before: &[u8], wanted: &[u8]) -> bool {
-    let real = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().expect("a REAL"));
-    if row.data_type != CipType::Real {
-        return now == wanted;
-    }
-    (real(now) - real(wanted)).abs() * 4.0 < (real(before) - real(wanted)).abs()
-}
-
-/// What `axisbridge attributes` says of each attribute that can be set, against what happens when it is set to another value: what is live
-/// is kept by the drive or by what acts on it, what is compared is refused, what is absent is not there.
-#[test]
-fn attributes_are_what_the_table_of_truths_says() {
-    let mapping = Mapping::embedded().expect("the shipped tables are sound");
-    let settings =
-        |text: &str| Settings { configuration: text.to_owned(), drives: Vec::new(), ..Settings::default() };
-    let mut shown = String::new();
-    for (bus, settings) in [
-        ("SERCOS", Settings::default()),
-        ("CANopen", settings(include_str!("can.toml"))),
-        ("DeviceNet", settings(include_str!("devicenet.toml"))),
-    ] {
-        let config = Config::parse(&settings.configuration, "rig.toml").expect("sound");
-        let stage = Stage::rehearse(&config, mapping.clone()).expect("it can be commissioned");
-        let axis =
-            stage.axes.iter().find(|axis| axis.device == 0 && axis.instance == 1).expect("the first axis");
-        let truths = stage.mapping.truths(&axis.attributes, &axis.south);
-        let mut rig = Rig::ready(settings);
-        rig.connect(vec![Step::Dwell { seconds: 10_000.0 }]);
-        rig.run_until(millis(20_000), "Stopped", |rig| {
-            rig.engine.devices()[0].axis_states().next().is_some_and(|(_, state)| state == AxisState::Stopped)
-        });
-        let client = Client::connect(&mut rig, CONTROLLER);
-        let counts = Truth::ALL.map(|truth| {
-            let count = truths.iter().filter(|row| row.truth == truth).count();
-            format!("{count} {truth}")
-        });
-        writeln!(shown, "{bus}: {}", counts.join(", ")).expect("a string");
-        let (mut kept, mut refused) = (0, Vec::new());
-        for row in truths.iter().filter(|row| row.access == Access::Set) {
-            let known = mapping.dictionaries.cip.attribute_by_id(row.id).expect("of the dictionary");
-            let (status, value) = client.ask(&mut rig, GET, 1, Some(row.id), &[]);
-            let absent = row.truth == Truth::Absent;
-            assert_eq!(
-                status == NOT_SUPPORTED,
-                absent,
-                "{bus}: {} is {}, and the answer 0x{status:02X}",
-                row.name,
-                row.truth
-            );
-            let Some(other) = another(known, &value).filter(|_| !absent && row.id != STOPPING_TORQUE) else {
-                continue;
-            };
-            let (status, _) = client.ask(&mut rig, SET, 1, Some(row.id), &other);
-            let (_, after) = client.ask(&mut rig, GET, 1, Some(row.id), &[]);
-            match row.truth {
-                Truth::Compared => {
-                    assert_eq!((status, &after), (INVALID_VALUE, &value), "{bus}: {}", row.name);
-                }
-                Truth::Live if status == OK => {
-                    assert!(
-                        is_near(known, &after, &value, &other),
-                        "{bus}: {} was {value:02X?}, set to {other:02X?}, is {after:02X?}",
-                        row.name
-                    );
-                    kept += 1;
-                }
-                Truth::Live => refused.push(format!("{} 0x{status:02X}", row.id)),
-                Truth::Stored => assert_eq!((status, after), (OK, other), "{bus}: {}", row.name),
-                Truth::Computed | Truth::Absent => panic!("{bus}: {} is {}", row.name, row.truth),
-            }
-        }
-        writeln!(shown, "  {kept} live settings changed and read back; refused: {}", refused.join(", "))
-            .expect("a string");
-    }
-    insta::assert_snapshot!(shown);
 }
 
 /// A box on the clock of its host measures no variation: the rows of it are not there, instead of a number that nobody has measured.

@@ -41,6 +41,7 @@ mod startup_lists;
 mod stopping;
 mod torque;
 mod trims;
+mod truths;
 mod two_masters;
 mod vendor_parameters;
 mod ways_back;

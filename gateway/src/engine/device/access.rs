@@ -386,13 +386,20 @@ impl Accessed<'_> {
         if stopping_torque::exceeds(parameter, generic, self.attributes, kept, self.axis) {
             return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
         }
-        let (bytes, len, clamped) = held.encode(generic).ok_or(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)?;
+        let (raw, len, clamped) = held.encode(generic).ok_or(GeneralStatus::ATTRIBUTE_NOT_SETTABLE)?;
+        let raw = raw.get(..len).unwrap_or(&[]);
+        // The end of a drive's range read as a REAL may be rounded beyond it; what was read can be set again.
+        let is_as_read = || {
+            let mut again = [0; 8];
+            let len = held.decode(raw).and_then(|generic| shown(Some(entry), generic, &mut again).ok());
+            len.is_some_and(|len| again.get(..len) == Some(bytes))
+        };
         // One count of the drive may be more than a time: written as 0 it would be none.
-        let vanishes = entry.is_reciprocal() && generic != 0 && bytes[..len].iter().all(|octet| *octet == 0);
-        if clamped || vanishes {
+        let vanishes = entry.is_reciprocal() && generic != 0 && raw.iter().all(|octet| *octet == 0);
+        if clamped && !is_as_read() || vanishes {
             return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
         }
-        Access::write(held.item, &bytes[..len]).ok_or(GeneralStatus::TOO_MUCH_DATA)
+        Access::write(held.item, raw).ok_or(GeneralStatus::TOO_MUCH_DATA)
     }
 
     /// What the drive has answered to a read, as the attribute; its length.

@@ -400,18 +400,23 @@ impl Follower {
         };
         let had_time = self.line.mean_path_delay().is_some();
         let event = match self.line.sync(at, phase) {
-            Taken::Stepped { by } => {
+            Taken::Stepped { by } if by.unsigned_abs() > self.status.threshold => {
                 self.status.steps = self.status.steps.saturating_add(1);
                 self.status.offset_from_master = Some(by.saturating_neg());
                 Event::Step
             }
-            Taken::Near { offset } | Taken::PutAside { offset } if had_time => {
+            // A step within the threshold is an offset like others: the clock was as far off as a synchronized one may be.
+            Taken::Stepped { by: offset } | Taken::Near { offset } | Taken::PutAside { offset }
+                if had_time =>
+            {
                 // Of us from the master, as everywhere in PTP.
                 self.status.offset_from_master = Some(offset.saturating_neg());
                 self.status.max_offset = self.status.max_offset.max(offset.unsigned_abs());
                 Event::Offset(offset)
             }
-            Taken::First | Taken::Near { .. } | Taken::PutAside { .. } => Event::NoDelay,
+            Taken::First | Taken::Stepped { .. } | Taken::Near { .. } | Taken::PutAside { .. } => {
+                Event::NoDelay
+            }
         };
         self.judge(event, at);
     }

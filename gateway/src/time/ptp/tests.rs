@@ -357,6 +357,19 @@ fn a_step_of_the_master_is_told_once_and_followed() {
 }
 
 #[test]
+fn a_step_within_the_threshold_leaves_it_synchronized() {
+    for (threshold, steps) in [(100_000, 0), (40_000, 1)] {
+        let master = Clock { step: Some((30, 50_000)), ..MASTER };
+        let network = Network { threshold: Some(threshold), ..Network::new(&[master], 60) };
+        let (run, status) = run(network);
+        assert_eq!((status.phase, status.steps), (SyncPhase::Synchronized, steps), "{threshold}: {run:?}");
+        let is_lost = run.iter().any(|(second, phase)| *second >= 30 && !phase.is_synchronized());
+        assert_eq!(is_lost, steps > 0, "{threshold}: {run:?}");
+        assert!(error(&status, &master).abs() < 50, "{threshold}: {}", error(&status, &master));
+    }
+}
+
+#[test]
 fn loss_and_jitter_leave_it_synchronized() {
     let lossy = Clock { loses: 5, ..MASTER };
     let (run, status) = run(Network::new(&[lossy], 200));

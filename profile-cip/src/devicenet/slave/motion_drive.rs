@@ -182,6 +182,11 @@ impl MotionDrive {
         &self.device
     }
 
+    /// The motion device, to change what it holds.
+    pub const fn device_mut(&mut self) -> &mut MotionDevice {
+        &mut self.device
+    }
+
     /// Switches main power.
     pub fn set_power(&mut self, on: bool) {
         self.power = on;
