@@ -115,7 +115,13 @@ pub struct SequenceAttributes {
     pub zero_speed: u16,
     /// How long it has to be so slow.
     pub zero_speed_time: u16,
-    /// Deceleration of a ramped stop.
+    /// Highest velocity forward of the ramp generator.
+    pub ramp_velocity_positive: u16,
+    /// Highest velocity backward of it.
+    pub ramp_velocity_negative: u16,
+    /// Its acceleration.
+    pub ramp_acceleration: u16,
+    /// Its deceleration, and that of a ramped stop.
     pub ramp_deceleration: u16,
     /// The same where that was not set.
     pub deceleration_limit: u16,

@@ -381,7 +381,13 @@ pub struct SequenceRow {
     pub zero_speed: Name,
     /// How long it has to be so slow.
     pub zero_speed_time: Name,
-    /// Deceleration of a ramped stop.
+    /// Highest velocity forward of the ramp generator.
+    pub ramp_velocity_positive: Name,
+    /// Highest velocity backward of it.
+    pub ramp_velocity_negative: Name,
+    /// Its acceleration.
+    pub ramp_acceleration: Name,
+    /// Its deceleration, and that of a ramped stop.
     pub ramp_deceleration: Name,
     /// The same where that was not set.
     pub deceleration_limit: Name,

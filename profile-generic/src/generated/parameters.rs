@@ -292,8 +292,6 @@ parameter_rows! {
         "How a disable stops the axis: 0 coast, 1 decelerate, 2 at the current limit.";
     SHUTDOWN_ACTION = 0x0B02, "shutdown_action", BasicDrive, None, Integer, Write,
         "What a shutdown does with the power stage: 0 keeps its supply, 1 drops it.";
-    STOPPING_DECELERATION = 0x0B03, "stopping_deceleration", BasicDrive, Acceleration, Integer, Write,
-        "Deceleration of a controlled stop.";
     STOPPING_TORQUE = 0x0B04, "stopping_torque", BasicDrive, Torque, Integer, Write,
         "Torque of a stop at the current limit.";
     STOPPING_TIME_LIMIT = 0x0B05, "stopping_time_limit", BasicDrive, Time, Integer, Write,
@@ -312,6 +310,14 @@ parameter_rows! {
         "How long an axis without torque is waited for until it counts as stopped.";
     ZERO_SPEED_TIME = 0x0B0C, "zero_speed_time", BasicDrive, Time, Integer, Write,
         "How long an axis has to be slow until it counts as standing.";
+    RAMP_VELOCITY_POSITIVE = 0x0B0D, "ramp_velocity_positive", BasicDrive, Velocity, Integer, Write,
+        "Highest velocity forward of the ramp of a velocity that is commanded at once.";
+    RAMP_VELOCITY_NEGATIVE = 0x0B0E, "ramp_velocity_negative", BasicDrive, Velocity, Integer, Write,
+        "Highest velocity backward of that ramp, as a negative number.";
+    RAMP_ACCELERATION = 0x0B0F, "ramp_acceleration", BasicDrive, Acceleration, Integer, Write,
+        "How fast that ramp gets quicker.";
+    RAMP_DECELERATION = 0x0B10, "ramp_deceleration", BasicDrive, Acceleration, Integer, Write,
+        "How fast that ramp gets slower, and a ramped stop.";
 
     HOMING_METHOD = 0x0C01, "homing_method", ApplicationFunction, None, Integer, Write,
         "How the drive homes, as its profile numbers it.";

@@ -2,9 +2,11 @@
 
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{NANO, millis};
+use axisbridge_tests::rig::motion_checker::violation::Rule;
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AttributeSet, AxisSet, Limits, Step};
 use profile_cip::device::axis_state::AxisState;
+use profile_cip::wire::motion::codes::{CommandTarget, ControlMode};
 use profile_generic::fault::FaultCause;
 use profile_sercos::slave::parameter::Definition;
 use profile_sercos::wire::idn::Idn;
@@ -20,6 +22,11 @@ const SLIDE: u8 = 2;
 
 /// Numbers of the attributes that these tests set.
 mod id {
+    pub const MOTION_POLARITY: u16 = 79;
+    pub const RAMP_VELOCITY_POSITIVE: u16 = 374;
+    pub const RAMP_VELOCITY_NEGATIVE: u16 = 375;
+    pub const RAMP_ACCELERATION: u16 = 376;
+    pub const RAMP_DECELERATION: u16 = 377;
     pub const KPI: u16 = 442;
     pub const KAFF: u16 = 460;
     pub const KVI: u16 = 462;
@@ -311,4 +318,64 @@ fn a_feedback_that_is_an_ldt_is_refused() {
     }
     assert_eq!(set(11), INVALID_VALUE, "LDT");
     assert_eq!(client.ask(&mut rig, GET, TURNTABLE, Some(FEEDBACK_TYPE), &[]), (OK, vec![17]), "as it was");
+}
+
+/// Velocities that the controller commands at once go by the ramp generator: a drive is sent no faster change, in either direction of the
+/// axis. Interpolated ones pass it (5-2.6.5.4).
+#[test]
+fn a_velocity_that_is_commanded_at_once_goes_by_the_ramp() {
+    const RAMP: [(u16, f32); 4] = [
+        (id::RAMP_VELOCITY_POSITIVE, 3.0),
+        (id::RAMP_VELOCITY_NEGATIVE, -2.0),
+        (id::RAMP_ACCELERATION, 10.0),
+        (id::RAMP_DECELERATION, 5.0),
+    ];
+    for (bus, settings) in [
+        ("SERCOS", Settings::default as fn() -> Settings),
+        ("CANopen", || settings(include_str!("can.toml"))),
+        ("DeviceNet", || settings(include_str!("devicenet.toml"))),
+    ] {
+        for (asked, inverted) in [(4.0, 0), (4.0, 1), (-4.0, 0), (-4.0, 1)] {
+            let what = format!("{bus}, {asked} rev/s, polarity {inverted}");
+            let mut rig = Rig::ready(settings());
+            let mut attributes: Vec<_> =
+                RAMP.iter().map(|(id, value)| AttributeSet::real(*id, *value)).collect();
+            attributes.push(AttributeSet::usint(id::MOTION_POLARITY, inverted));
+            let mut config = rig.controller_config();
+            config.axes[0].control_mode = ControlMode::VELOCITY;
+            config.command_target = CommandTarget::IMMEDIATE;
+            let jog = Step::Jog { axis: 1, velocity: asked, acceleration: 1e5, jerk: 1e9, seconds: 1.5 };
+            let program = vec![
+                Step::SetAttributes { axis: 1, attributes },
+                Step::Enable(AxisSet::one(TURNTABLE)),
+                jog,
+                Step::Dwell { seconds: 100.0 },
+            ];
+            rig.motion_checker.tolerate("the ramp is slower than the controller commands", |violation| {
+                matches!(violation.rule, Rule::Velocity | Rule::Acceleration)
+            });
+            rig.connect_with(config, program);
+            // What the drive is sent, in turns per second as the controller means them.
+            let turn = if inverted == 1 { -1.0 } else { 1.0 };
+            #[allow(clippy::cast_precision_loss)]
+            let sent = |rig: &Rig| turn * rig.engine.axes()[0].command().velocity.get() as f64 / 1e9;
+            let (mut last, mut fastest, mut rise, mut fall) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+            for _ in 0..200 {
+                rig.run_for(millis(40));
+                let now = sent(&rig);
+                let change = (now.abs() - last.abs()) / 0.04;
+                (rise, fall) = (rise.max(change), fall.max(-change));
+                if now.abs() > fastest.abs() {
+                    fastest = now;
+                }
+                last = now;
+            }
+            let limit = if asked > 0.0 { 3.0 } else { -2.0 };
+            assert!((fastest - limit).abs() < 1e-6, "{what}: {fastest}");
+            assert_eq!(last, 0.0, "{what}: it has ended");
+            // A cycle of up to 10 ms more than 40 ms may lie between two looks.
+            assert!((9.0..=12.5).contains(&rise), "{what}: {rise} rev/s²");
+            assert!((4.5..=6.25).contains(&fall), "{what}: {fall} rev/s²");
+        }
+    }
 }

@@ -100,7 +100,11 @@ fn another(row: &CipAttribute, value: &[u8]) -> Option<Vec<u8>> {
     match (row.data_type, value) {
         (CipType::Real, &[a, b, c, d]) => {
             let before = f32::from_le_bytes([a, b, c, d]);
-            let near = if before == 0.0 { 1_000.0 } else { before * 0.9 };
+            let near = match before {
+                0.0 if row.max == Some(0) => -1_000.0,
+                0.0 => 1_000.0,
+                _ => before * 0.9,
+            };
             other.copy_from_slice(&near.to_le_bytes());
         }
         _ => *other.first_mut()? ^= 1,

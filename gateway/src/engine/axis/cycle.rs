@@ -605,7 +605,8 @@ impl AxisChannel {
         let halts = self.drive.action == Action::Halt;
         let mut points = self.command;
         let counts = operating && !halts && self.takes_set_points();
-        let fine = self.set_points.write(counts, &mut points);
+        let ramp = (&self.start_stop.settings.ramp, passed);
+        let fine = self.set_points.write(counts, ramp, &mut points);
         match fine {
             Some(Quality::Lost) => self.lose_command(now, system, Loss::Silent),
             Some(_) => (),

@@ -5,11 +5,12 @@ use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
 use profile_generic::interpolation::{
     FineInterpolator, InterpolatorConfig, MAX_EXTRAPOLATION, Motion, Quality, TargetUpdate, UpdateError,
 };
-use profile_generic::mode::ModeSelection;
+use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::quantity::{Position, Quantity, Velocity};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::guard::{Bounds, Finding, Guard, Lead, Trip};
+use super::ramp::Ramp;
 use super::trim::Trims;
 use super::{Limits, Loss, MODE_TIME_OUT};
 use crate::engine::cyclic::Cycle;
@@ -268,10 +269,22 @@ impl SetPoints {
     }
 
     /// Puts the set-points of this cycle into `command`, where they `count`: else time passes for them.
-    pub fn write(&mut self, counts: bool, command: &mut AxisCommand) -> Option<Quality> {
+    /// Velocities that are commanded at once go by the `ramp`; a time has `passed` since the last cycle.
+    pub fn write(
+        &mut self,
+        counts: bool,
+        (ramp, passed): (&Ramp, DurationNs),
+        command: &mut AxisCommand,
+    ) -> Option<Quality> {
         let interpolator = self.interpolator.as_mut()?;
         if counts && self.sequence.is_some() {
-            return Some(interpolator.write_ahead(self.acts_at, self.ahead, command));
+            let before = command.velocity;
+            let quality = interpolator.write_ahead(self.acts_at, self.ahead, command);
+            let is_immediate = interpolator.config().target_update == TargetUpdate::Immediate;
+            if is_immediate && command.selection() == OperatingMode::Velocity.into() {
+                command.velocity = ramp.follow(before, command.velocity, passed);
+            }
+            return Some(quality);
         }
         interpolator.pass(self.acts_at);
         None
@@ -318,10 +331,11 @@ impl SetPoints {
 mod tests {
     use super::*;
     use profile_generic::image::CommandSet;
-    use profile_generic::mode::OperatingMode;
 
     const UNIT: i64 = 1_000_000_000;
     const PERIOD: DurationNs = DurationNs::from_millis(4);
+    const NO_RAMP: (&Ramp, DurationNs) =
+        (&Ramp { positive: None, negative: None, acceleration: None, deceleration: None }, PERIOD);
     const UPDATES: Updates = Updates { period: PERIOD, may_miss: 4, first: TargetUpdate::Interpolate };
 
     fn at(millis: i64) -> MonotonicTime {
@@ -388,10 +402,10 @@ mod tests {
         assert_eq!(points.begin_cycle(&cycle(1)), (cycle(0).span, cycle(0).span));
         assert_eq!(points.begin_cycle(&cycle(4)), (DurationNs::from_millis(3), DurationNs::from_millis(3)));
         let mut fine = command(0);
-        assert!(points.write(true, &mut fine).is_none(), "none were taken");
+        assert!(points.write(true, NO_RAMP, &mut fine).is_none(), "none were taken");
         points.take(1);
-        assert!(points.write(false, &mut fine).is_none());
-        assert!(points.write(true, &mut fine).is_some());
+        assert!(points.write(false, NO_RAMP, &mut fine).is_none());
+        assert!(points.write(true, NO_RAMP, &mut fine).is_some());
     }
 
     #[test]

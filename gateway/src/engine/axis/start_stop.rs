@@ -22,7 +22,7 @@ use profile_generic::sequence::{
 use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::{START_TIME_OUT, STOP_TIME_OUT, Tolerances};
+use super::{Ramp, START_TIME_OUT, STOP_TIME_OUT, Tolerances};
 
 /// How an axis is to start and stop, and what stops it, as controller and configuration have it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -33,6 +33,8 @@ pub struct StopSettings {
     pub times: SequenceTimes,
     /// Deceleration of a ramped stop; without one the drive decelerates by itself.
     pub deceleration: Option<Acceleration>,
+    /// The ramp of a velocity that is commanded at once.
+    pub ramp: Ramp,
     /// It may be started while it moves, at the speed it has.
     pub flying_start: bool,
     /// A limit switch stops it.

@@ -12,7 +12,7 @@ use profile_generic::time::DurationNs;
 use super::access::{generic_of, held};
 use super::axis::CipAxis;
 use super::scaling::number_of;
-use crate::engine::axis::{AxisChannel, StopSettings, Tolerances};
+use crate::engine::axis::{AxisChannel, Ramp, StopSettings, Tolerances};
 use crate::mapping::{AttributeEntry, AttributeTable, Backing, SequenceAttributes};
 
 /// What a stop falls back to where the controller has set nothing.
@@ -92,6 +92,7 @@ impl Settings<'_> {
                 .or_else(|| self.value(rows.deceleration_limit))
                 .map(Acceleration)
                 .or(defaults.deceleration),
+            ramp: self.ramp(),
             flying_start: raw(rows.flying_start) != 0 && by_velocity,
             checks_overtravel: raw(rows.overtravel_checking) != 0,
             tolerances: self.tolerances(),
@@ -118,12 +119,31 @@ impl Settings<'_> {
         }
     }
 
+    /// The ramp generator. The directions change places with an inverted Motion Polarity.
+    fn ramp(&self) -> Ramp {
+        let limit = |parameter| {
+            let id = self.attribute_of(parameter)?;
+            generic_of(self.attributes, self.device, self.place, id).filter(|generic| *generic != 0)
+        };
+        Ramp {
+            positive: limit(Parameter::RAMP_VELOCITY_POSITIVE).map(Velocity),
+            negative: limit(Parameter::RAMP_VELOCITY_NEGATIVE).map(Velocity),
+            acceleration: self.value(self.rows.ramp_acceleration).map(Acceleration),
+            deceleration: self.value(self.rows.ramp_deceleration).map(Acceleration),
+        }
+    }
+
+    /// The attribute that stands for a parameter.
+    fn attribute_of(&self, parameter: Parameter) -> Option<u16> {
+        let mut entries = self.attributes.entries().iter();
+        let is = |entry: &&AttributeEntry| matches!(entry.backing, Backing::Parameter { parameter: own, .. } if own == parameter);
+        Some(entries.find(is)?.id)
+    }
+
     /// Limits of velocity error and torque. A drive that has the parameter watches it itself.
     fn tolerances(&self) -> Tolerances {
         let of = |parameter| {
-            let mut entries = self.attributes.entries().iter();
-            let is = |entry: &&AttributeEntry| matches!(entry.backing, Backing::Parameter { parameter: own, .. } if own == parameter);
-            let id = entries.find(is)?.id;
+            let id = self.attribute_of(parameter)?;
             if self.is_in_drive(id) { None } else { self.value(id) }
         };
         Tolerances {

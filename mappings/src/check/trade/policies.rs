@@ -211,6 +211,9 @@ fn goes_by(mapping: &Mapping, row: &CipAttributeRow, id: u16) -> bool {
         sequence.brake_engage_delay,
         sequence.zero_speed,
         sequence.zero_speed_time,
+        sequence.ramp_velocity_positive,
+        sequence.ramp_velocity_negative,
+        sequence.ramp_acceleration,
         sequence.ramp_deceleration,
         sequence.deceleration_limit,
     ];

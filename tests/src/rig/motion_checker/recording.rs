@@ -251,8 +251,10 @@ impl Instants {
 /// Tells frames that the master sends from those that come back: both are recorded at the same port.
 #[derive(Default)]
 struct Sent {
-    /// The frame that has begun the last cycle.
-    first: Vec<u8>,
+    /// The frames that have begun the last cycles and have not come back, the newest last: drives on a host that pauses answer for several
+    /// cycles at once.
+    out: VecDeque<Vec<u8>>,
+    /// That of the last cycle has come back.
     has_returned: bool,
     /// Telegrams of this cycle that were sent, by their type.
     seen: Vec<u8>,
@@ -260,6 +262,8 @@ struct Sent {
 
 impl Sent {
     const TYPE: usize = 14;
+    /// Cycles after which a frame that has not come back is lost: a second at 1 ms.
+    const OUT_MAX: usize = 1_000;
 
     /// Whether it is MDT0.
     fn begins_cycle(frame: &[u8]) -> bool {
@@ -270,11 +274,17 @@ impl Sent {
     /// taken for the return of the one before.
     fn is_new(&mut self, frame: &[u8]) -> bool {
         if Self::begins_cycle(frame) {
-            if frame == self.first && !self.has_returned {
-                self.has_returned = true;
+            if let Some(place) = self.out.iter().position(|out| out == frame) {
+                // Those before it are lost.
+                self.out.drain(..=place);
+                self.has_returned = self.out.is_empty();
                 return false;
             }
-            (self.first, self.has_returned) = (frame.to_vec(), false);
+            if self.out.len() == Self::OUT_MAX {
+                self.out.pop_front();
+            }
+            self.out.push_back(frame.to_vec());
+            self.has_returned = false;
             self.seen.clear();
             return true;
         }
@@ -298,4 +308,40 @@ fn datagram(frame: &[u8], device: Ipv4Addr) -> Option<(bool, &[u8])> {
         return None;
     }
     Some((Ipv4Addr::from(*to) == device, udp.get(8..usize::from(word(4)?))?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use profile_sercos::wire::header::{Channel, Kind, Phase, PhaseField, TelegramType};
+
+    /// An MDT0 or an AT0 with a content.
+    fn frame(is_at: bool, content: u8) -> Vec<u8> {
+        let mut frame = vec![0; 60];
+        let kind = if is_at { Kind::At } else { Kind::Mdt };
+        let telegram = TelegramType::new(Channel::Primary, kind, 0);
+        let header = Header { source: [2; 6], telegram, phase: PhaseField::new(false, 0, Phase::CP4) };
+        header.emit(&mut frame).expect("room");
+        frame[59] = content;
+        frame
+    }
+
+    #[test]
+    fn frames_that_come_back_late_are_not_taken_for_sent_ones() {
+        let mut sent = Sent::default();
+        let mut is_new = |is_at, content| sent.is_new(&frame(is_at, content));
+        assert!(is_new(false, 1) && is_new(true, 1), "sent");
+        assert!(!is_new(false, 1) && !is_new(true, 9), "and back");
+        // Two cycles are sent before anything of them comes back.
+        assert!(is_new(false, 2) && is_new(true, 2));
+        assert!(is_new(false, 3) && is_new(true, 3));
+        assert!(!is_new(false, 2) && !is_new(true, 9), "of the one before");
+        assert!(!is_new(false, 3) && !is_new(true, 9));
+        // One is lost on its way.
+        assert!(is_new(false, 4) && is_new(false, 5));
+        assert!(!is_new(false, 5));
+        assert!(is_new(false, 6));
+        // Until it counts each frame is like the one before.
+        assert!(!is_new(false, 6) && is_new(false, 6) && !is_new(false, 6));
+    }
 }
