@@ -246,17 +246,21 @@ fn both_arrived(printed: &Path) {
 
 /// Nothing that the drives were sent was a jump; there were so many set-points at least. Then the same with one set-point changed,
 /// which has to show.
-fn no_jump(capture: &Path, set_points: u64, changed: u64) {
+fn no_jump(capture: &Path, log: &str, set_points: u64, changed: u64) {
     let config = Config::parse(CONFIGURATION, "three clocks").expect("the configuration is right");
     let period = DurationNs::from_micros(PERIOD_US.into());
     let judged = recording::judge(&config, period, capture, |_, _, _| {}).expect("the recording can be read");
     let shown: Vec<_> = judged.violations.iter().take(5).map(ToString::to_string).collect();
     assert!(
         shown.is_empty(),
-        "{} violations, frames late by {} at most: {}",
+        "{} violations, frames late by {} at most: {}\n{}",
         judged.violations.len(),
         judged.late,
-        shown.join("\n")
+        shown.join("\n"),
+        log.lines()
+            .filter(|line| line.contains("WARN") || line.contains("ERROR"))
+            .collect::<Vec<_>>()
+            .join("\n")
     );
     for (axis, fastest) in judged.statistics.iter().zip([0.5e9, 5e9]) {
         assert!(axis.set_points > set_points && axis.fastest > fastest, "synchronous set-points: {axis:?}");
@@ -364,7 +368,12 @@ fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
             }
         });
 
-        assert!(controller.ended().is_none(), "the axes have moved all the time");
+        assert!(
+            controller.ended().is_none(),
+            "the axes have moved all the time: {}\n{}",
+            std::fs::read_to_string(&printed).unwrap_or_default(),
+            plant.text()
+        );
         let status = controller.wait(Duration::from_secs(u64::from(pace.motion) + 60));
         assert!(
             status.success(),
@@ -384,7 +393,7 @@ fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
             println!("---- {title}\n{text}");
         }
         assert!(!is_faulted(&log), "{log}");
-        no_jump(&capture, 4_000, 2_000);
+        no_jump(&capture, &log, 4_000, 2_000);
         for (title, text) in phases {
             assert!(is_synchronized(&text), "{title}: {text}");
             // An alarm is due at a change of the grandmaster, and ten seconds after the loss of time (IEC 61800-7-202, 6.5.4). At a Sync
@@ -461,7 +470,7 @@ fn a_controller_that_is_the_grandmaster_moves_the_axes_of_its_follower() {
         let gateway_capture = plant.capture.clone();
         let log = plant.end();
         assert!(!is_faulted(&log), "{log}");
-        no_jump(&gateway_capture, 300, 400);
+        no_jump(&gateway_capture, &log, 300, 400);
         ptp_is_told_as_it_should(&capture);
         // What ptp4l measures is the clock of the controller against the host's.
         let followed = std::fs::read_to_string(scratch("ptp4l-130.log")).unwrap_or_default();
