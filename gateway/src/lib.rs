@@ -1,5 +1,6 @@
 //! The Axisbridge gateway.
 
+pub mod alone;
 pub mod capture;
 pub mod check;
 pub mod cli;

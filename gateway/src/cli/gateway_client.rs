@@ -26,6 +26,15 @@ pub struct Reply {
     pub last: String,
 }
 
+impl Reply {
+    /// Takes the text of a reply apart.
+    pub fn of(text: &str) -> Self {
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let last = lines.pop().unwrap_or_default();
+        Self { lines, last }
+    }
+}
+
 impl GatewayClient {
     /// Connects. The gateway may take `patience` for each line of an answer.
     pub fn connect(path: &Path, patience: Duration) -> Result<Self, CliError> {

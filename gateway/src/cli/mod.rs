@@ -48,7 +48,7 @@ enum Command {
     Run(RunArguments),
     /// Show what a running gateway does now: buses, system time, axes and faults.
     Status(StatusArguments),
-    /// Read, write, back up, restore and compare the parameters of a drive, through the running gateway.
+    /// Read, write, back up, restore and compare the parameters of a drive, and execute its commands.
     #[command(subcommand)]
     Param(param::ParamCommand),
     /// Check mapping tables, overlays and a configuration, and explain the findings.

@@ -32,6 +32,8 @@ pub const DATA_MAX: usize = 65_535;
 pub enum Target {
     /// An element of an IDN of a SERCOS drive.
     Element(Idn, Element),
+    /// The data status of an IDN of a SERCOS drive, two bytes; it is only read.
+    Status(Idn),
     /// An object of a CANopen device.
     Object(Object),
     /// An attribute of a drive on DeviceNet.

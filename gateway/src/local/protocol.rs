@@ -15,7 +15,7 @@ use profile_generic::parameter::{Access, Parameter};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 
-use super::drive::job::Ask;
+use super::drive::job::{Act, Ask, Listing};
 use crate::config::AxisKind;
 use crate::engine::local::{Failure, Generator, Jog, Move, Order};
 use crate::mapping::Mapping;
@@ -80,7 +80,7 @@ pub enum Request {
         /// What is written; `None` reads.
         wanted: Option<i64>,
     },
-    /// Read, write or list parameters of a drive by its numbers.
+    /// Read, write or list parameters of a drive by its numbers, or execute a command.
     Drive {
         /// Position of the axis in the configuration, from 0.
         axis: usize,
@@ -106,7 +106,7 @@ pub enum Request {
 pub enum BadRequest {
     /// The first word is none of the protocol's.
     #[error(
-        "unknown word `{0}`: expected box, axes, status, enable, disable, stop, reset, jog, move, home, parameters, list, read or write"
+        "unknown word `{0}`: expected box, axes, status, enable, disable, stop, reset, jog, move, home, parameters, list, read, write or command"
     )]
     Word(String),
     /// The word needs an axis.
@@ -199,9 +199,9 @@ pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Resu
         },
         "list" => {
             let axis = axis("list", &mut words, axes)?;
-            let backup = option(&mut words, "backup")?;
-            Request::Drive { axis, ask: Ask::List { backup } }
+            Request::Drive { axis, ask: Ask::List { of: listing(&mut words)? } }
         }
+        "command" => command(&mut words, axes)?,
         "status" => Request::Status { axis: axis("status", &mut words, axes)? },
         _ => {
             let word = ["enable", "disable", "stop", "reset", "jog", "move", "home"]
@@ -257,6 +257,29 @@ fn option<'a>(words: &mut impl Iterator<Item = &'a str>, known: &'static str) ->
         Some(word) if word == known => Ok(true),
         Some(text) => Err(BadRequest::Unexpected { text: text.to_owned(), expected: known }),
     }
+}
+
+/// Which list the line goes on with.
+fn listing<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<Listing, BadRequest> {
+    match words.next() {
+        None => Ok(Listing::All),
+        Some("backup") => Ok(Listing::Backup),
+        Some("commands") => Ok(Listing::Commands),
+        Some(text) => Err(BadRequest::Unexpected { text: text.to_owned(), expected: "backup or commands" }),
+    }
+}
+
+/// A procedure command, and what is done with it.
+fn command<'a>(words: &mut impl Iterator<Item = &'a str>, axes: &[String]) -> Result<Request, BadRequest> {
+    let axis = axis("command", words, axes)?;
+    let missing = |what| BadRequest::Missing { word: "command", what };
+    let name = words.next().ok_or(missing("the number of a command"))?;
+    let id = id(name)?.ok_or_else(|| BadRequest::Parameter { name: name.to_owned() })?;
+    let expected = "start, progress or cancel";
+    let word = words.next().ok_or(missing(expected))?;
+    let act = Act::ALL.into_iter().find(|act| act.word() == word);
+    let act = act.ok_or_else(|| BadRequest::Unexpected { text: word.to_owned(), expected })?;
+    Ok(Request::Drive { axis, ask: Ask::Command { id, act } })
 }
 
 /// A write to a parameter by its number: the value is the rest of the line. `None` for a name.
@@ -586,11 +609,15 @@ mod tests {
         for (line, axis, ask) in [
             ("read x S-0-0100", 0, Ask::Read { id: id("S-0-0100"), brief: false }),
             ("read y-2 6081h brief", 1, Ask::Read { id: id("6081h"), brief: true }),
-            ("list x", 0, Ask::List { backup: false }),
-            ("list y-2 backup", 1, Ask::List { backup: true }),
+            ("list x", 0, Ask::List { of: Listing::All }),
+            ("list y-2 backup", 1, Ask::List { of: Listing::Backup }),
             ("write x P-0-4000 12.5", 0, write("P-0-4000", "12.5")),
             ("  write\ty-2  0x6081.0   two  words ", 1, write("6081h", "two  words")),
             ("write x 1.1.7 hex:0102", 0, write("1.1.7", "hex:0102")),
+            ("list x commands", 0, Ask::List { of: Listing::Commands }),
+            ("command x S-0-0264 start", 0, Ask::Command { id: id("S-0-0264"), act: Act::Start }),
+            ("command y-2 1010:01 progress", 1, Ask::Command { id: id("1010:01"), act: Act::Progress }),
+            ("command x S-0-0264 cancel", 0, Ask::Command { id: id("S-0-0264"), act: Act::Cancel }),
         ] {
             assert_eq!(parse(line, &axes(), &parameters()), drive(axis, ask), "{line}");
         }
@@ -605,6 +632,12 @@ mod tests {
             ("read x 6081h brief brief", "syntax"),
             ("list x all", "syntax"),
             ("list", "no-axis"),
+            ("command x", "syntax"),
+            ("command x notch start", "no-parameter"),
+            ("command x S-0-0264", "syntax"),
+            ("command x S-0-0264 stop", "syntax"),
+            ("command x S-0-0264 start now", "syntax"),
+            ("command z S-0-0264 start", "no-axis"),
         ] {
             assert_eq!(parse(line, &axes(), &parameters()).expect_err(line).code(), code, "{line}");
         }

@@ -167,7 +167,7 @@ pub fn belongs_to_gateway(id: Id) -> Option<&'static str> {
         },
         Id::Object(object) => match object.index {
             0x1010 | 0x1011 => {
-                Some("storing and restoring all parameters has no value that can be read back")
+                Some("it is a command and has no value that can be read back; `param command` executes it")
             }
             index if is_set_by_gateway(index) && index < 0x2000 => Some(COMMUNICATION),
             index if is_set_by_gateway(index) => Some(COMMAND),

@@ -2,6 +2,7 @@
 //! the drive, the file of a backup, and the start-up list of a drive.
 
 pub mod backup;
+pub mod command;
 pub mod id;
 pub mod known;
 pub mod startup;

@@ -410,7 +410,7 @@ fn clock_place<End>(adapters: &[(AdapterConfig, End)], ports: &[Option<HostPort>
 }
 
 /// The port of a bus on CAN.
-fn can_port(
+pub(crate) fn can_port(
     link: &CanLink,
     bit_rate: BitRate,
     watches: &mut Vec<CanWatch>,

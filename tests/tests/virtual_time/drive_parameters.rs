@@ -22,8 +22,8 @@ use profile_sercos::wire::idn::Idn;
 const AXES: [&str; 2] = ["turntable", "slide"];
 
 /// A box with local control, and a client.
-struct Bench {
-    rig: Rig,
+pub(super) struct Bench {
+    pub(super) rig: Rig,
     orders: ClientEnd,
     end: DirectEnd,
     catalogue: Catalogue,
@@ -44,13 +44,13 @@ impl Bench {
         Self { rig, orders, end, catalogue, ids: 0 }
     }
 
-    fn sercos(prepare: impl FnOnce(&mut Rig)) -> Self {
+    pub(super) fn sercos(prepare: impl FnOnce(&mut Rig)) -> Self {
         let mut rig = Rig::new(Settings::default());
         prepare(&mut rig);
         Self::new(rig, BOX)
     }
 
-    fn canopen(more: &str, prepare: impl FnOnce(&mut Rig)) -> Self {
+    pub(super) fn canopen(more: &str, prepare: impl FnOnce(&mut Rig)) -> Self {
         let configuration = format!("{}{more}", include_str!("can.toml"));
         let settings =
             Settings { configuration: configuration.clone(), drives: Vec::new(), ..Settings::default() };
@@ -60,7 +60,7 @@ impl Bench {
     }
 
     /// The reply to a line.
-    fn say(&mut self, line: &str) -> String {
+    pub(super) fn say(&mut self, line: &str) -> String {
         self.say_while(line, |_, _| {})
     }
 
@@ -103,7 +103,7 @@ impl Bench {
         panic!("no end of {line}");
     }
 
-    fn object(&mut self, line: &str) -> serde_json::Value {
+    pub(super) fn object(&mut self, line: &str) -> serde_json::Value {
         let reply = self.say(line);
         let start = reply.find('{').unwrap_or_else(|| panic!("{line} gives {reply}"));
         assert!(reply.starts_with("ok "), "{reply}");
@@ -111,7 +111,7 @@ impl Bench {
     }
 
     /// Enables the turntable as another client.
-    fn enable(&mut self) {
+    pub(super) fn enable(&mut self) {
         self.orders
             .requests
             .push(Request::Order { client: 2, id: 8, axis: 0, order: Order::Enable })
@@ -122,7 +122,7 @@ impl Bench {
     }
 }
 
-fn held(bench: &Bench, idn: Idn) -> i64 {
+pub(super) fn held(bench: &Bench, idn: Idn) -> i64 {
     bench.rig.line.slaves()[0].store().number_of(idn)
 }
 

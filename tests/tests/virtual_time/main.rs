@@ -10,6 +10,7 @@ mod can_faults;
 mod can_modes;
 mod computed_values;
 mod devicenet;
+mod drive_commands;
 mod drive_parameters;
 mod drive_profile;
 mod ending;

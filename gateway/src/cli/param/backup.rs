@@ -6,6 +6,7 @@ use super::BackupArguments;
 use super::drive::{Drive, Found};
 use crate::cli::CliError;
 use crate::cli::progress::Progress;
+use crate::local::drive::job::Listing;
 use crate::parameter::backup::{Backup, Identity, Kept, Unread};
 
 /// Reads all parameters of the backup list and writes them to the file.
@@ -14,7 +15,7 @@ use crate::parameter::backup::{Backup, Identity, Kept, Unread};
 /// The drive or the gateway does not answer; there is no list; the file cannot be written.
 pub fn run(arguments: &BackupArguments) -> Result<ExitCode, CliError> {
     let mut drive = Drive::connect(&arguments.at)?;
-    let list = drive.list(true)?;
+    let list = drive.list(Listing::Backup)?;
     if list.parameters.is_empty() {
         return Err(format!("nothing is known that could be backed up of this drive ({})", list.bus).into());
     }

@@ -1,30 +1,62 @@
-//! The drive of an axis behind the gateway: requests of the local socket and what their replies mean.
+//! The drive of an axis: requests of the local socket, and what their replies mean. A gateway answers them, or the drive itself
+//! over its bus.
 
 use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use serde::Serialize;
 
 use super::At;
-use crate::cli::CliError;
+use super::alone::Alone;
 use crate::cli::gateway_client::GatewayClient;
-use crate::local::drive::job::ParameterReport;
+pub use crate::cli::gateway_client::Reply;
+use crate::cli::{CliError, signal};
+use crate::local::drive::CommandReport;
+use crate::local::drive::job::{Act, Listing, ParameterReport};
 use crate::parameter::id::Id;
 
 /// How long a drive may take for a request: several accesses, each of which the gateway gives up after a second or so.
 const PATIENCE: Duration = Duration::from_secs(30);
 
+/// Who answers requests.
+pub trait Link {
+    /// The reply to a request.
+    fn ask(&mut self, request: &str) -> Result<Reply, CliError>;
+
+    /// A flag that is set once the user wants an end.
+    fn stop(&mut self) -> Result<Arc<AtomicBool>, CliError>;
+
+    /// Whether it is the drive itself, without a gateway.
+    fn is_alone(&self) -> bool;
+}
+
+impl Link for GatewayClient {
+    fn ask(&mut self, request: &str) -> Result<Reply, CliError> {
+        Self::ask(self, request)
+    }
+
+    fn stop(&mut self) -> Result<Arc<AtomicBool>, CliError> {
+        signal::stop_on_signals()
+    }
+
+    fn is_alone(&self) -> bool {
+        false
+    }
+}
+
 /// The drive of an axis.
 pub struct Drive {
-    client: GatewayClient,
+    link: Box<dyn Link>,
     axis: String,
 }
 
 /// What came of a request.
 #[derive(Debug)]
-pub enum Found {
-    /// The parameter.
-    Report(Box<ParameterReport>),
+pub enum Found<T = ParameterReport> {
+    /// The parameter, or the command.
+    Report(Box<T>),
     /// The gateway or the drive refused.
     Refused(Refused),
 }
@@ -96,13 +128,27 @@ impl Listed {
 }
 
 impl Drive {
-    /// Connects to the gateway.
+    /// Connects to the gateway, or takes the bus up.
     pub fn connect(at: &At) -> Result<Self, CliError> {
         let axis = at.axis.clone();
         if axis.is_empty() || axis.chars().any(|letter| letter.is_whitespace() || letter.is_control()) {
             return Err(format!("`{}` is not the name of an axis", axis.escape_debug()).into());
         }
-        Ok(Self { client: GatewayClient::connect(&at.local, PATIENCE)?, axis })
+        let link: Box<dyn Link> = match &at.config {
+            Some(config) => Box::new(Alone::open(config, &axis)?),
+            None => Box::new(GatewayClient::connect(&at.local, PATIENCE)?),
+        };
+        Ok(Self { link, axis })
+    }
+
+    /// A flag that is set once the user wants an end.
+    pub fn stop(&mut self) -> Result<Arc<AtomicBool>, CliError> {
+        self.link.stop()
+    }
+
+    /// Whether no gateway runs between this and the drive.
+    pub fn is_alone(&self) -> bool {
+        self.link.is_alone()
     }
 
     /// The name of the axis.
@@ -113,7 +159,7 @@ impl Drive {
     /// Reads a parameter; `brief` without unit and limits.
     pub fn read(&mut self, parameter: &str, brief: bool) -> Result<Found, CliError> {
         let brief = if brief && Id::parse(parameter).is_some() { " brief" } else { "" };
-        self.ask("read", &format!("{}{brief}", word(parameter)?))
+        self.parameter("read", &format!("{}{brief}", word(parameter)?))
     }
 
     /// Writes a parameter, and reads it back.
@@ -123,7 +169,7 @@ impl Drive {
                 "a value of one line without control characters is expected; hex:BYTES has no limits".into(),
             );
         }
-        let written = self.ask("write", &format!("{} {value}", word(parameter)?))?;
+        let written = self.parameter("write", &format!("{} {value}", word(parameter)?))?;
         if Id::parse(parameter).is_some() || matches!(written, Found::Refused(_)) {
             // Read back by the gateway.
             return Ok(written);
@@ -140,10 +186,24 @@ impl Drive {
         })
     }
 
-    /// The parameters that are known, or those of a backup.
-    pub fn list(&mut self, backup: bool) -> Result<List, CliError> {
-        let backup = if backup { " backup" } else { "" };
-        let reply = self.client.ask(&format!("list {}{backup}", self.axis))?;
+    /// Starts a procedure command, asks how far it is, or cancels it.
+    pub fn command(&mut self, command: &str, act: Act) -> Result<Found<CommandReport>, CliError> {
+        let read = |words: &str| serde_json::from_str::<CommandReport>(words).ok();
+        let mut found = self.ask("command", &format!("{} {}", word(command)?, act.word()), read)?;
+        if let Found::Report(report) = &mut found {
+            report.recommission &= !self.is_alone();
+        }
+        Ok(found)
+    }
+
+    /// The parameters that are known, or some of them.
+    pub fn list(&mut self, of: Listing) -> Result<List, CliError> {
+        let of = match of {
+            Listing::All => "",
+            Listing::Backup => " backup",
+            Listing::Commands => " commands",
+        };
+        let reply = self.link.ask(&format!("list {}{of}", self.axis))?;
         let Some(words) = reply.last.strip_prefix(&format!("ok list {} ", self.axis)) else {
             return Err(refused(&reply.last).text.into());
         };
@@ -156,12 +216,27 @@ impl Drive {
         })
     }
 
-    fn ask(&mut self, request: &str, rest: &str) -> Result<Found, CliError> {
-        let reply = self.client.ask(&format!("{request} {} {rest}", self.axis))?.last;
+    /// A request for a parameter.
+    fn parameter(&mut self, request: &str, rest: &str) -> Result<Found, CliError> {
+        let mut found = self.ask(request, rest, report)?;
+        if let Found::Report(report) = &mut found {
+            // Without a gateway the drive is commissioned at the next start in any case.
+            report.recommission &= !self.is_alone();
+        }
+        Ok(found)
+    }
+
+    fn ask<T>(
+        &mut self,
+        request: &str,
+        rest: &str,
+        read: impl FnOnce(&str) -> Option<T>,
+    ) -> Result<Found<T>, CliError> {
+        let reply = self.link.ask(&format!("{request} {} {rest}", self.axis))?.last;
         let Some(words) = reply.strip_prefix(&format!("ok {request} {} ", self.axis)) else {
             return Ok(Found::Refused(refused(&reply)));
         };
-        report(words)
+        read(words)
             .map(|report| Found::Report(Box::new(report)))
             .ok_or_else(|| format!("unexpected reply `{reply}`").into())
     }

@@ -2,7 +2,7 @@
 
 use super::drive::{Drive, Found, Refused};
 use crate::cli::CliError;
-use crate::local::drive::job::ParameterReport;
+use crate::local::drive::job::{Listing, ParameterReport};
 use crate::parameter::backup::{Backup, Identity, Kept, Unread, questions};
 
 impl From<ParameterReport> for Kept {
@@ -42,7 +42,7 @@ impl Backup {
     /// Whether the drive of an axis can have these parameters: the bus must be the same, and the type of the drive, unless it is
     /// forced.
     pub fn is_for(&self, drive: &mut Drive, force: bool) -> Result<(), CliError> {
-        let bus = drive.list(true)?.bus;
+        let bus = drive.list(Listing::Backup)?.bus;
         if self.bus != bus {
             return Err(format!("the backup is of a drive on {}, and this one is on {bus}", self.bus).into());
         }

@@ -1,6 +1,8 @@
-//! `axisbridge param`: the parameters of a drive, through a running gateway and its local socket.
+//! `axisbridge param`: the parameters of a drive, through a running gateway and its local socket, or without one.
 
+mod alone;
 mod backup;
+mod command;
 mod compare;
 mod drive;
 mod file;
@@ -14,6 +16,7 @@ use clap::{Args, Subcommand};
 
 use self::drive::{Drive, Found};
 use super::{CliError, print};
+use crate::local::drive::job::Listing;
 
 /// What `param` does.
 #[derive(Debug, Subcommand)]
@@ -30,6 +33,8 @@ pub enum ParamCommand {
     Restore(RestoreArguments),
     /// Compare a drive with a backup. Exit status 1 if they differ.
     Compare(CompareArguments),
+    /// Execute a procedure command of the drive, show how far it is, and what came of it. Exit status 0 only if it is done.
+    Command(CommandArguments),
 }
 
 /// The axis, and the gateway.
@@ -40,6 +45,12 @@ pub struct At {
     /// The Unix socket of the running gateway (`run --local`).
     #[arg(long, value_name = "SOCKET", default_value = "/run/axisbridge/local")]
     local: PathBuf,
+    /// Without a gateway: over the bus of the configuration, which must have no master. No axis can be enabled.
+    #[arg(long, requires = "config", conflicts_with = "local")]
+    alone: bool,
+    /// The configuration, for --alone.
+    #[arg(long, value_name = "FILE", requires = "alone")]
+    config: Option<PathBuf>,
 }
 
 /// Arguments of `param list`.
@@ -50,6 +61,9 @@ pub struct ListArguments {
     /// Only the parameters of a backup.
     #[arg(long)]
     backup: bool,
+    /// Only procedure commands.
+    #[arg(long, conflicts_with = "backup")]
+    commands: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -117,6 +131,24 @@ pub struct CompareArguments {
     json: bool,
 }
 
+/// Arguments of `param command`.
+#[derive(Debug, Args)]
+pub struct CommandArguments {
+    #[command(flatten)]
+    at: At,
+    /// The command: an IDN (S-0-0264), an object (1010:01 stores parameters, 1011:01 restores defaults), or its name.
+    command: String,
+    /// Cancel it when it is not done after this time, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u16).range(1..))]
+    time_limit: u16,
+    /// Cancel the command instead of starting it.
+    #[arg(long)]
+    cancel: bool,
+    /// Print one JSON object for each state, and line.
+    #[arg(long)]
+    json: bool,
+}
+
 /// Runs a command.
 ///
 /// # Errors
@@ -129,11 +161,17 @@ pub fn run(command: &ParamCommand) -> Result<ExitCode, CliError> {
         ParamCommand::Backup(arguments) => backup::run(arguments),
         ParamCommand::Restore(arguments) => restore::run(arguments),
         ParamCommand::Compare(arguments) => compare::run(arguments),
+        ParamCommand::Command(arguments) => command::run(arguments),
     }
 }
 
 fn list(arguments: &ListArguments) -> Result<ExitCode, CliError> {
-    let list = Drive::connect(&arguments.at)?.list(arguments.backup)?;
+    let of = match (arguments.backup, arguments.commands) {
+        (true, _) => Listing::Backup,
+        (_, true) => Listing::Commands,
+        _ => Listing::All,
+    };
+    let list = Drive::connect(&arguments.at)?.list(of)?;
     let text = if arguments.json { show::list_json(&list)? } else { show::list(&list) };
     print(text, ExitCode::SUCCESS)
 }

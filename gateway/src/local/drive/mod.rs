@@ -1,3 +1,7 @@
-//! Parameters of drives for clients of the socket: the accesses that a request takes one after the other.
+//! What clients of the socket ask of drives: the accesses that a request takes one after the other.
 
+mod command;
 pub mod job;
+mod parameter;
+
+pub use self::command::{CommandReport, State};

@@ -81,7 +81,7 @@ pub fn class_2_bit(cause: FaultCause) -> u16 {
 
 /// S-0-0390 of a class 1 (`0xF`) or class 2 (`0xE`) diagnosis. No public list of codes of the drive profile is
 /// known: the low word is the number of the bit in S-0-0011 or S-0-0012.
-pub fn number(class: u32, bit: u32) -> u32 {
+pub const fn number(class: u32, bit: u32) -> u32 {
     0xC000_0000 | class << 16 | bit
 }
 

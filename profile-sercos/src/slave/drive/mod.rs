@@ -18,6 +18,7 @@
 mod control;
 mod fault;
 pub mod homing;
+pub mod memory;
 pub mod parameters;
 pub mod probe;
 pub mod scaling;
@@ -37,6 +38,7 @@ use profile_generic::time::DurationNs;
 
 use self::control::{Control, MODE_BLOCKS, ModeSwitch};
 use self::homing::Homing;
+use self::memory::Memory;
 use self::parameters::MODES;
 use self::probe::Probe;
 use self::scaling::Scales;
@@ -74,6 +76,7 @@ pub struct Drive {
     referenced: bool,
     probe: Probe,
     homing: Homing,
+    memory: Memory,
     /// Time does not pass for motor and loops.
     paused: bool,
     /// The parameters of the drive that it is like, until its own are made.
@@ -100,6 +103,7 @@ impl Drive {
             referenced: false,
             probe,
             homing: Homing::default(),
+            memory: Memory::default(),
             paused: false,
             given: None,
         })
@@ -185,6 +189,11 @@ impl Drive {
     /// What bits 15 and 14 of S-0-0135 show while an error locks the drive: families differ, 00 or 10.
     pub fn set_locked_ready(&mut self, ready: ReadyState) {
         self.shown.locked_ready = ready;
+    }
+
+    /// How long it takes to store parameters (S-0-0264), and whether that fails in the end.
+    pub fn set_memory(&mut self, time: DurationNs, is_broken: bool) {
+        (self.memory.time, self.memory.is_broken) = (time, is_broken);
     }
 
     /// How long it takes to another operation mode.
@@ -342,10 +351,10 @@ impl Application for Drive {
     }
 
     fn order(&mut self, idn: Idn, order: Order, store: &mut Store) -> Result<Progress, SvcError> {
-        if idn == Idn::PROBING_CYCLE {
-            Ok(self.probe.order(order))
-        } else {
-            self.order_homing(idn, order, store)
+        match idn {
+            Idn::PROBING_CYCLE => Ok(self.probe.order(order)),
+            memory::BACKUP => Ok(self.memory.order(order)),
+            _ => self.order_homing(idn, order, store),
         }
     }
 
@@ -353,6 +362,7 @@ impl Application for Drive {
         match idn {
             // Probing goes on until it is cancelled.
             Idn::PROBING_CYCLE => Progress::InProcess,
+            memory::BACKUP => self.memory.progress(),
             Idn::DRIVE_CONTROLLED_HOMING => self.homing.progress_by_drive(),
             Idn::CONTROL_UNIT_CONTROLLED_HOMING => self.homing.progress_by_master(),
             _ => Progress::Failed,
@@ -383,6 +393,7 @@ impl Application for Drive {
     }
 
     fn cycle(&mut self, cycle: Cycle, store: &mut Store) {
+        self.memory.step(cycle.elapsed);
         if self.paused {
             return;
         }
@@ -408,7 +419,12 @@ impl Application for Drive {
     }
 
     fn diagnosis(&self) -> Diagnosis {
-        self.diagnose()
+        match self.diagnose() {
+            Diagnosis { number: 0, text: "", errors, warnings } if self.memory.has_failed() => {
+                Diagnosis { errors, warnings, number: memory::FAILURE, text: memory::FAILURE_TEXT }
+            }
+            diagnosis => diagnosis,
+        }
     }
 
     fn reset(&mut self, _: &mut Store) -> bool {

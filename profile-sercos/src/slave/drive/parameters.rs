@@ -169,6 +169,7 @@ fn define_values(store: &mut Store, servo: &ServoParameters) {
     }
     super::probe::define(store, length);
     super::homing::define(store, length, speed);
+    super::memory::define(store);
     let positioning = [
         value(Idn::TARGET_POSITION, a::POSITION, "Target position", Command).unit(length),
         value(Idn::POSITIONING_VELOCITY, a::VELOCITY, "Positioning velocity", Command).unit(speed),

@@ -7,6 +7,7 @@
 //! What a drive is told goes out after SYNC and counts from the next one; what it tells was captured at SYNC.
 
 pub mod commissioner;
+pub mod direct;
 pub mod failure;
 pub mod layout;
 pub mod load;
@@ -38,7 +39,7 @@ use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
-use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
+use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::{DriveIdentity, Item, Mapping};
@@ -416,8 +417,7 @@ impl CanBus {
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
     ) {
         if self.direct.contains(ticket) {
-            let result = outcome.result.map(|()| None).map_err(DirectFailure::Sdo);
-            return self.direct.end(DirectResult { result, data: buffer(outcome.data) });
+            return self.direct.end(direct::result(outcome));
         }
         for (place, device) in self.devices.iter_mut().enumerate() {
             let run = device.run(place);
@@ -615,24 +615,20 @@ impl South for CanBus {
     }
 
     fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {
-        let DirectTask { target, write, data } = task;
-        let Target::Object(object) = target else { return Err((DirectFailure::OtherBus, data)) };
+        let request = direct::request(task)?;
         let place = self.places.of(axis).filter(|(device, _)| self.is_operational(&self.devices[*device]));
-        let Some((device, _)) = place else { return Err((DirectFailure::NoDrive, data)) };
-        if !self.direct.is_free() {
-            return Err((DirectFailure::Unsent, data));
-        }
-        let mux = Mux::new(object.index, object.sub);
-        let request = match write {
-            true => SdoRequest::download(mux, SdoData::Buffer(data)),
-            false => SdoRequest::upload_into(mux, data),
+        let Some((device, _)) = place else {
+            return Err((DirectFailure::NoDrive, direct::buffer(request.data)));
         };
+        if !self.direct.is_free() {
+            return Err((DirectFailure::Unsent, direct::buffer(request.data)));
+        }
         match self.master.sdo_submit(self.devices[device].node, request, Priority::Normal) {
             Ok(ticket) => {
                 self.direct.begin(ticket);
                 Ok(())
             }
-            Err((_, request)) => Err((DirectFailure::Unsent, buffer(request.data))),
+            Err((_, request)) => Err((DirectFailure::Unsent, direct::buffer(request.data))),
         }
     }
 
@@ -724,14 +720,6 @@ fn request(access: &Access) -> Option<SdoRequest> {
         Operation::Read => Some(SdoRequest::upload(mux)),
         Operation::Write(data) => Some(SdoRequest::download(mux, SdoData::inline(data)?)),
         Operation::Command | Operation::Start | Operation::Progress | Operation::Cancel => None,
-    }
-}
-
-/// The buffer of a direct access, which is never inline.
-fn buffer(data: SdoData) -> Vec<u8> {
-    match data {
-        SdoData::Buffer(buffer) => buffer,
-        SdoData::Inline(_) => Vec::new(),
     }
 }
 

@@ -6,6 +6,7 @@
 
 pub mod commissioner;
 pub mod commissioning;
+pub mod direct;
 mod progress;
 mod recovery;
 
@@ -36,7 +37,7 @@ use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Refusal};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
-use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
+use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
 use crate::mapping::{DriveFacts, DriveProgram, Full, Item, Mapping, SercosAxis, SercosError};
@@ -552,8 +553,7 @@ impl SercosBus {
         answer: &mut dyn FnMut(&mut [AxisChannel], Answer),
     ) {
         if self.direct.contains(ticket) {
-            let result = outcome.result.map(|reply| reply.attribute).map_err(DirectFailure::Svc);
-            return self.direct.end(DirectResult { result, data: buffer(outcome.data) });
+            return self.direct.end(direct::result(outcome));
         }
         // An access may be answered only after its drive was lost.
         let asked = |drive: &Drive| drive.accesses.contains(ticket);
@@ -709,20 +709,18 @@ impl South for SercosBus {
     }
 
     fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {
-        let DirectTask { target, write, data } = task;
-        let Target::Element(idn, element) = target else { return Err((DirectFailure::OtherBus, data)) };
+        let request = direct::request(task)?;
         let slave = self.drive_of(axis).and_then(Drive::present_slave);
-        let Some(slave) = slave else { return Err((DirectFailure::NoDrive, data)) };
+        let Some(slave) = slave else { return Err((DirectFailure::NoDrive, direct::buffer(request.data))) };
         if !self.direct.is_free() {
-            return Err((DirectFailure::Unsent, data));
+            return Err((DirectFailure::Unsent, direct::buffer(request.data)));
         }
-        let operation = if write { SvcOperation::Write(element) } else { SvcOperation::Read(element) };
-        match self.master.svc_submit(slave, SvcRequest::new(idn, operation).with_buffer(data)) {
+        match self.master.svc_submit(slave, request) {
             Ok(ticket) => {
                 self.direct.begin(ticket);
                 Ok(())
             }
-            Err((_, request)) => Err((DirectFailure::Unsent, buffer(request.data))),
+            Err((_, request)) => Err((DirectFailure::Unsent, direct::buffer(request.data))),
         }
     }
 
@@ -879,14 +877,6 @@ fn request(access: &Access) -> Option<SvcRequest> {
         Operation::Cancel => set(ProcedureControl::CANCEL)?,
     };
     Some(if access.urgent { request.urgent() } else { request })
-}
-
-/// The buffer of a direct access, which is never inline.
-fn buffer(data: SvcData) -> Vec<u8> {
-    match data {
-        SvcData::Buffer(buffer) => buffer,
-        SvcData::Inline(_) => Vec::new(),
-    }
 }
 
 /// What a request came to.

@@ -1,0 +1,126 @@
+//! SDO to one CANopen device.
+//!
+//! Nothing but SDO is sent: no command of NMT, no SYNC, no heartbeat. A bus on which another master sends is left alone.
+
+use profile_cia402::master::foreign::LISTEN;
+use profile_cia402::sdo::client::{Client, ClientConfig};
+use profile_cia402::wire::{Function, NodeId, cob_id};
+use profile_generic::can::Frame;
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+use super::{Line, Stage};
+use crate::engine::bus::can::direct;
+use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
+use crate::engine::port::{CanInput, CanPort, CanSent};
+
+/// Frames taken in one step at most.
+const FRAMES_PER_STEP: usize = 64;
+
+/// How often what does not fit the transmit queue is offered again.
+const FULL_PAUSE: DurationNs = DurationNs::from_millis(1);
+
+/// How long the transmit queue may stay full: then nobody acknowledges what is sent.
+const STUCK_MAX: DurationNs = DurationNs::from_secs(1);
+
+/// Longest time for an answer.
+const PATIENCE: DurationNs = DurationNs::from_millis(500);
+
+/// The bus, and the device on it.
+pub struct CanLine {
+    port: Box<dyn CanPort>,
+    node: NodeId,
+    client: Client,
+    stage: Stage,
+    /// Nothing is sent before then.
+    listens_until: Option<MonotonicTime>,
+    /// What the transmit queue had no room for, and since when.
+    held: Option<(Frame, MonotonicTime)>,
+    again: Option<MonotonicTime>,
+}
+
+impl CanLine {
+    /// The device with this node-id.
+    #[must_use]
+    pub fn new(port: Box<dyn CanPort>, node: NodeId) -> Self {
+        let client = Client::new(ClientConfig { timeout: PATIENCE, ..ClientConfig::default() });
+        Self { port, node, client, stage: Stage::Starting, listens_until: None, held: None, again: None }
+    }
+
+    fn take_frame(&mut self, now: MonotonicTime, frame: &Frame) -> Result<(), String> {
+        match Function::of(frame.id()) {
+            Some(Function::Sync | Function::Nmt | Function::Rpdo(..)) => Err(format!(
+                "another master is on this bus: it sends {}; nothing is sent any more",
+                frame.id()
+            )),
+            Some(Function::SdoResponse(node)) if node == self.node => {
+                // What is no answer leaves the time-out running.
+                let _ = self.client.handle(now, frame.data());
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn send(&mut self, now: MonotonicTime) -> Result<(), String> {
+        self.again = None;
+        loop {
+            let held = self.held.take();
+            let next = held.map(|(frame, since)| (frame, since)).or_else(|| {
+                let bytes = self.client.poll(now)?;
+                Some((Frame::new(cob_id::sdo_request(self.node), &bytes).ok()?, now))
+            });
+            let Some((frame, since)) = next else { return Ok(()) };
+            if self.port.send(now, &frame) == CanSent::Full {
+                if now.since(since) > STUCK_MAX {
+                    return Err("no station of the bus acknowledges what is sent".to_owned());
+                }
+                (self.held, self.again) = (Some((frame, since)), Some(now + FULL_PAUSE));
+                return Ok(());
+            }
+        }
+    }
+}
+
+impl Line for CanLine {
+    fn step(&mut self, now: MonotonicTime) -> Result<Stage, String> {
+        for _ in 0..FRAMES_PER_STEP {
+            match self.port.receive(now) {
+                Some(CanInput::Frame(frame)) => self.take_frame(now, &frame)?,
+                Some(CanInput::BusOff) => return Err("the interface is off the bus".to_owned()),
+                Some(CanInput::BusOn) => {}
+                None => break,
+            }
+        }
+        let listens_until = *self.listens_until.get_or_insert(now + LISTEN);
+        if self.stage == Stage::Starting && now >= listens_until {
+            self.stage = Stage::Ready;
+        }
+        if self.stage == Stage::Ready {
+            self.send(now)?;
+        }
+        Ok(self.stage.clone())
+    }
+
+    fn wake_at(&self) -> Option<MonotonicTime> {
+        match self.stage {
+            Stage::Starting => self.listens_until,
+            // Nothing else can be done while the queue is full.
+            _ => self.again.or_else(|| self.client.wake_at()),
+        }
+    }
+
+    fn begin(&mut self, now: MonotonicTime, task: DirectTask) -> Result<(), NotBegun> {
+        let request = direct::request(task)?;
+        let started = self.client.start(now, request);
+        started.map_err(|request| (DirectFailure::Unsent, direct::buffer(request.data)))
+    }
+
+    fn take(&mut self) -> Option<DirectResult> {
+        self.client.take_outcome().map(direct::result)
+    }
+
+    fn end(&mut self, _now: MonotonicTime) {
+        // Each access was waited for: there is nothing to take back.
+        self.stage = Stage::Ended;
+    }
+}

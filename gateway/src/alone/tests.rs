@@ -1,0 +1,273 @@
+//! Simulated drives without a gateway, in virtual time.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use profile_cia402::wire::{Function, NodeId};
+use profile_generic::can::Frame;
+use profile_generic::can::bus as wire;
+use profile_generic::can::timing::BitRate;
+use profile_generic::scaling::UnitKind;
+use profile_sercos::checker::checked_bus::CheckedBus;
+use profile_sercos::master::config::MasterConfig;
+use profile_sercos::master::event::Port;
+use profile_sercos::wire::header::Phase;
+use profile_sercos::wire::idn::Idn;
+
+use super::can::CanLine;
+use super::sercos::SercosLine;
+use super::*;
+use crate::engine::port::{CanInput, CanPort, CanSent, EthernetPort};
+use crate::mapping::Mapping;
+use crate::parameter::known::Bus;
+use crate::simulate::can_bus::InProcessCan;
+use crate::simulate::can_drive::{DriveNode, drive};
+use crate::simulate::drives::{DriveNetwork, SIMULATED_MAC, drives};
+
+/// Two drives in a line, with the checker.
+struct Judged {
+    network: DriveNetwork,
+    checked: CheckedBus,
+    returned: VecDeque<(Port, Vec<u8>)>,
+    /// The highest phase that a drive was in.
+    highest: Option<Phase>,
+}
+
+/// A part that the test looks at while a session has it.
+struct Shared<T>(Rc<RefCell<T>>);
+
+impl<T> Clone for Shared<T> {
+    fn clone(&self) -> Self {
+        Self(Rc::clone(&self.0))
+    }
+}
+
+impl EthernetPort for Shared<Judged> {
+    fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
+        let (port, frame) = self.0.borrow_mut().returned.pop_front()?;
+        buffer[..frame.len()].copy_from_slice(&frame);
+        Some((port, frame.len()))
+    }
+
+    fn send(&mut self, now: MonotonicTime, port: Port, frame: &[u8]) -> bool {
+        let Judged { network, checked, returned, highest } = &mut *self.0.borrow_mut();
+        network.handle_time(now);
+        let mut arrived = |port, frame: &mut [u8]| returned.push_back((port, frame.to_vec()));
+        checked.send(now, port, &mut frame.to_vec(), network, &mut |_, _, _| {}, &mut arrived);
+        checked.judge();
+        let phases = network.slaves().iter().filter_map(|slave| slave.state().phase());
+        *highest = phases.chain(*highest).max_by_key(|phase| phase.0);
+        true
+    }
+}
+
+/// Time that jumps to whatever is due, from an instant on.
+fn wait(from: MonotonicTime) -> Wait {
+    let mut now = from;
+    Box::new(move |until| {
+        let latest = now + DurationNs::from_millis(1);
+        now = until.map_or(latest, |at| at.clamp(now + DurationNs(1_000), latest));
+        now
+    })
+}
+
+fn names() -> Vec<String> {
+    ["x", "y"].map(str::to_owned).to_vec()
+}
+
+fn line() -> Shared<Judged> {
+    let network = drives([(7, UnitKind::Rotary), (3, UnitKind::Linear)], false);
+    let checked = CheckedBus::new(MonotonicTime::ZERO);
+    Shared(Rc::new(RefCell::new(Judged { network, checked, returned: VecDeque::new(), highest: None })))
+}
+
+/// A session with the drive of this address.
+fn open_sercos(line: &Shared<Judged>, address: u16, from: MonotonicTime) -> Result<Session, String> {
+    let config = MasterConfig { stable_cycles: 10, ..MasterConfig::new(SIMULATED_MAC, 2_000_000) };
+    let line = SercosLine::new(config, Box::new(line.clone()), address).unwrap();
+    let catalogue = Catalogue::new(vec![Bus::Sercos, Bus::Sercos], &Mapping::embedded().unwrap());
+    Session::open(Box::new(line), wait(from), (names(), 0), catalogue, || true)
+}
+
+const BEGIN: MonotonicTime = MonotonicTime(1_000_000_000);
+
+fn ask(session: &mut Session, line: &str) -> String {
+    session.ask(line).unwrap_or_else(|why| panic!("{line}: {why}"))
+}
+
+#[test]
+fn a_drive_takes_in_cp2_what_it_protects_in_operation_and_keeps_it() {
+    let line = line();
+    let mut session = open_sercos(&line, 7, BEGIN).unwrap();
+    let written = ask(&mut session, "write x S-0-0121 5");
+    assert!(written.starts_with("ok write x {\"id\":\"S-0-0121\","), "{written}");
+    assert!(written.contains("\"value\":\"5\",\"before\":\"1\""), "{written}");
+    let ended = session.now;
+    drop(session);
+    let held = |place: usize| line.0.borrow().network.slaves()[place].store().number_of(Idn::standard(121));
+    assert_eq!((held(0), held(1)), (5, 1), "the drive with address 7, and no other");
+    assert_eq!(line.0.borrow().highest, Some(Phase::CP2), "never above CP2");
+    // Another one, with the same drives.
+    let mut session = open_sercos(&line, 7, ended + DurationNs::from_secs(1)).unwrap();
+    let read = ask(&mut session, "read x S-0-0121 brief");
+    assert!(read.contains("\"value\":\"5\""), "{read}");
+    let list = ask(&mut session, "list x backup");
+    assert!(list.contains("parameter S-0-0104 name=") && list.ends_with("source=S-0-0192\n"), "{list}");
+}
+
+#[test]
+fn refusals_are_those_of_the_drive_and_of_the_gateway() {
+    let line = line();
+    let mut session = open_sercos(&line, 3, BEGIN).unwrap();
+    for (request, reply) in [
+        (
+            "write x S-0-0104 0",
+            "error write x value: S-0-0104: the drive refuses the operation data with 0x7006: operation data is below the \
+             minimum\n",
+        ),
+        (
+            "write x S-0-0134 0xE000",
+            "error write x gateway: S-0-0134 is not written: the gateway commands the drive with it\n",
+        ),
+        (
+            "read x 6081h",
+            "error read x no-parameter: 6081:00 is a number of CANopen drives: the drive of this axis is another one\n",
+        ),
+        (
+            "command x S-0-0148 start",
+            "error command x gateway: S-0-0148 is not executed: the gateway executes it for a controller\n",
+        ),
+        ("read z S-0-0104", "error read - no-axis: unknown axis `z`: expected x, y\n"),
+    ] {
+        assert_eq!(ask(&mut session, request), reply, "{request}");
+    }
+    for (request, why) in [
+        ("enable x", "`enable x` needs a gateway that runs"),
+        ("read y S-0-0104", "`read y S-0-0104` needs a gateway that runs"),
+        (
+            "read x notch",
+            "`notch` is a name, which needs a gateway that runs: expected a number such as S-0-0100 or 6081h",
+        ),
+    ] {
+        assert_eq!(session.ask(request).unwrap_err(), why);
+    }
+}
+
+#[test]
+fn a_command_of_a_drive_is_executed_in_cp2() {
+    let line = line();
+    let mut session = open_sercos(&line, 7, BEGIN).unwrap();
+    let begun = ask(&mut session, "command x S-0-0264 start");
+    assert!(begun.ends_with("\"state\":\"in-process\",\"status\":\"0x0007\"}\n"), "{begun}");
+    let done = (0..1_000).map(|_| ask(&mut session, "command x S-0-0264 progress"));
+    let done = done.into_iter().find(|reply| !reply.contains("in-process")).unwrap();
+    assert!(done.contains("\"state\":\"done\",\"status\":\"0x0003\""), "{done}");
+    let cancelled = ask(&mut session, "command x S-0-0264 cancel");
+    assert!(cancelled.contains("\"state\":\"not-set\",\"status\":\"0x0000\""), "{cancelled}");
+}
+
+#[test]
+fn a_drive_that_is_not_there_is_named_with_those_that_are() {
+    let why = open_sercos(&line(), 9, BEGIN).err().unwrap();
+    assert_eq!(why, "no drive has the SERCOS address 9: those on the line have 7, 3");
+}
+
+#[test]
+fn a_line_without_drives_ends_with_the_reason() {
+    let line = line();
+    line.0.borrow_mut().network = drives([], false);
+    let why = open_sercos(&line, 9, BEGIN).err().unwrap();
+    assert!(why.starts_with("no slave answers"), "{why}");
+}
+
+/// A device on CAN, and what was sent to it.
+struct Watched {
+    bus: InProcessCan<DriveNode>,
+    sent: Vec<Frame>,
+    /// What another station sends next.
+    foreign: Option<Frame>,
+}
+
+impl CanPort for Shared<Watched> {
+    fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
+        let mut watched = self.0.borrow_mut();
+        let foreign = watched.foreign.take().map(CanInput::Frame);
+        foreign.or_else(|| watched.bus.receive(now))
+    }
+
+    fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent {
+        let mut watched = self.0.borrow_mut();
+        watched.sent.push(*frame);
+        watched.bus.send(now, frame)
+    }
+}
+
+fn can() -> Shared<Watched> {
+    let rate = BitRate::classic(500_000).unwrap();
+    let device = drive(NodeId::new(2).ok(), 1).unwrap();
+    let bus = InProcessCan::new(wire::Bus::new(rate), vec![device], None);
+    Shared(Rc::new(RefCell::new(Watched { bus, sent: Vec::new(), foreign: None })))
+}
+
+fn open_can(bus: &Shared<Watched>, node: u8) -> Result<Session, String> {
+    let line = CanLine::new(Box::new(bus.clone()), NodeId::new(node).unwrap());
+    let can = Bus::Can { source: "dictionary", objects: Vec::new() };
+    let catalogue = Catalogue::new(vec![can], &Mapping::embedded().unwrap());
+    Session::open(Box::new(line), wait(BEGIN), (vec!["x".to_owned()], 0), catalogue, || true)
+}
+
+#[test]
+fn nothing_but_sdo_is_sent_to_a_canopen_device() {
+    let bus = can();
+    let mut session = open_can(&bus, 2).unwrap();
+    let written = ask(&mut session, "write x 6081h u32:4711");
+    assert!(written.ends_with("\"data\":\"67120000\"}\n"), "{written}");
+    let read = ask(&mut session, "read x 1008h");
+    assert!(read.contains("\"data\":\"4178697362726964676520"), "Axisbridge: {read}");
+    let stored = ask(&mut session, "command x 1010:01 start");
+    assert!(stored.ends_with("\"state\":\"done\"}\n"), "{stored}");
+    assert_eq!(
+        ask(&mut session, "write x 6040h 15"),
+        "error write x gateway: 6040:00 is not written: the gateway commands the drive with it\n"
+    );
+    assert_eq!(
+        ask(&mut session, "read x 2ABCh"),
+        "error read x absent: 2ABC:00: the drive refuses it with 0x06020000: object does not exist\n"
+    );
+    drop(session);
+    let watched = bus.0.borrow();
+    let node = NodeId::new(2).unwrap();
+    assert!(watched.sent.iter().all(|frame| Function::of(frame.id()) == Some(Function::SdoRequest(node))));
+    assert!(watched.sent.len() > 8, "{}", watched.sent.len());
+}
+
+#[test]
+fn a_device_that_is_not_there_does_not_answer() {
+    let mut session = open_can(&can(), 5).unwrap();
+    let reply = ask(&mut session, "read x 1000h");
+    assert!(reply.starts_with("error read x unanswered: 1000:00: "), "{reply}");
+}
+
+#[test]
+fn a_bus_of_another_master_is_left_alone() {
+    let bus = can();
+    let sync = Frame::new(profile_cia402::wire::cob_id::SYNC, &[]).unwrap();
+    bus.0.borrow_mut().foreign = Some(sync);
+    let why = open_can(&bus, 2).err().unwrap();
+    assert!(why.starts_with("another master is on this bus: it sends "), "{why}");
+    assert!(bus.0.borrow().sent.is_empty());
+    // One that comes later ends it too.
+    let mut session = open_can(&bus, 2).unwrap();
+    bus.0.borrow_mut().foreign = Some(sync);
+    let why = session.ask("read x 1000h").unwrap_err();
+    assert!(why.starts_with("another master is on this bus: it sends "), "{why}");
+}
+
+#[test]
+fn who_does_not_want_to_go_on_is_let_go() {
+    let line = CanLine::new(Box::new(can()), NodeId::new(2).unwrap());
+    let catalogue = Catalogue::new(vec![Bus::Devicenet], &Mapping::embedded().unwrap());
+    let opened = Session::open(Box::new(line), wait(BEGIN), (names(), 0), catalogue, || false);
+    assert_eq!(opened.err().unwrap(), "interrupted");
+}
