@@ -2,6 +2,9 @@
 //!
 //! Nothing but SDO is sent: no command of NMT, no SYNC, no heartbeat. A bus on which another master sends is left alone.
 
+use profile_cia402::drive::index::{AXIS_OFFSET, STATUSWORD};
+use profile_cia402::drive::states::State;
+use profile_cia402::drive::statusword::Statusword;
 use profile_cia402::master::foreign::LISTEN;
 use profile_cia402::sdo::client::{Client, ClientConfig};
 use profile_cia402::wire::{Function, NodeId, cob_id};
@@ -10,8 +13,9 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::{Line, Stage};
 use crate::engine::bus::can::direct;
-use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
+use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
 use crate::engine::port::{CanInput, CanPort, CanSent};
+use crate::mapping::Object;
 
 /// Frames taken in one step at most.
 const FRAMES_PER_STEP: usize = 64;
@@ -30,6 +34,8 @@ pub struct CanLine {
     port: Box<dyn CanPort>,
     node: NodeId,
     client: Client,
+    /// The statusword of each axis.
+    statuswords: Vec<Target>,
     stage: Stage,
     /// Nothing is sent before then.
     listens_until: Option<MonotonicTime>,
@@ -39,11 +45,21 @@ pub struct CanLine {
 }
 
 impl CanLine {
-    /// The device with this node-id.
+    /// The device with this node-id and these axes, from 0.
     #[must_use]
-    pub fn new(port: Box<dyn CanPort>, node: NodeId) -> Self {
+    pub fn new(port: Box<dyn CanPort>, node: NodeId, axes: impl IntoIterator<Item = u16>) -> Self {
         let client = Client::new(ClientConfig { timeout: PATIENCE, ..ClientConfig::default() });
-        Self { port, node, client, stage: Stage::Starting, listens_until: None, held: None, again: None }
+        let statusword = |axis| Target::Object(Object { index: STATUSWORD + axis * AXIS_OFFSET, sub: 0 });
+        Self {
+            port,
+            node,
+            client,
+            statuswords: axes.into_iter().map(statusword).collect(),
+            stage: Stage::Starting,
+            listens_until: None,
+            held: None,
+            again: None,
+        }
     }
 
     fn take_frame(&mut self, now: MonotonicTime, frame: &Frame) -> Result<(), String> {
@@ -117,6 +133,18 @@ impl Line for CanLine {
 
     fn take(&mut self) -> Option<DirectResult> {
         self.client.take_outcome().map(direct::result)
+    }
+
+    fn torque_reports(&self) -> &[Target] {
+        &self.statuswords
+    }
+
+    fn has_torque(&self, report: &[u8]) -> bool {
+        let state = report
+            .try_into()
+            .ok()
+            .and_then(|word| Statusword::from_bits_retain(u16::from_le_bytes(word)).state());
+        state.is_none_or(State::has_torque)
     }
 
     fn end(&mut self, _now: MonotonicTime) {

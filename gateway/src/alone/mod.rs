@@ -17,7 +17,9 @@ mod tests;
 
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use crate::engine::direct::{DirectAnswer, DirectFailure, DirectResult, DirectTask, Direction, NotBegun};
+use crate::engine::direct::{
+    DirectAnswer, DirectFailure, DirectResult, DirectTask, Direction, NotBegun, Target,
+};
 use crate::local::drive::job::{Context, Job, Step};
 use crate::local::protocol::{self, BadRequest, Request};
 use crate::parameter::id::Id;
@@ -28,6 +30,9 @@ const READY_MAX: DurationNs = DurationNs::from_secs(60);
 
 /// Longest time until the bus is down again.
 const END_MAX: DurationNs = DurationNs::from_secs(5);
+
+/// Longest report of the torque, bytes.
+const REPORT_LEN: usize = 8;
 
 /// Where a bus is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,6 +66,16 @@ pub trait Line {
 
     /// Takes the result of the access, once there is one.
     fn take(&mut self) -> Option<DirectResult>;
+
+    /// What says whether the drive has torque; empty where it cannot have any.
+    fn torque_reports(&self) -> &[Target] {
+        &[]
+    }
+
+    /// Whether one of them says so, or nothing that makes sense.
+    fn has_torque(&self, _report: &[u8]) -> bool {
+        false
+    }
 
     /// Takes the bus down.
     fn end(&mut self, now: MonotonicTime);
@@ -132,12 +147,32 @@ impl Session {
                 Step::Reply(reply) => return Ok(reply),
                 Step::Access(target, direction, data) => {
                     let write = direction != Direction::Read;
-                    let DirectResult { result, data } = self.access(DirectTask { target, write, data })?;
+                    let refusal = if write { self.guard()? } else { None };
+                    let DirectResult { result, data } = match refusal {
+                        Some(failure) => DirectResult { result: Err(failure), data },
+                        None => self.access(DirectTask { target, write, data })?,
+                    };
                     let answer = DirectAnswer { client: 0, id: 0, result, data };
                     step = self.with_context(axis, |context| job.take(answer, context));
                 }
             }
         }
+    }
+
+    /// Why nothing is written now: the drive says that it has torque, or does not say that it has none. A device without such an
+    /// object is no drive.
+    fn guard(&mut self) -> Result<Option<DirectFailure>, String> {
+        for target in self.line.torque_reports().to_vec() {
+            let data = Vec::with_capacity(REPORT_LEN);
+            let DirectResult { result, data } = self.access(DirectTask { target, write: false, data })?;
+            match result {
+                Ok(_) if self.line.has_torque(&data) => return Ok(Some(DirectFailure::Torque)),
+                Ok(_) => {}
+                Err(failure) if failure.code() == "absent" => {}
+                Err(failure) => return Ok(Some(failure)),
+            }
+        }
+        Ok(None)
     }
 
     /// One access, to its end.

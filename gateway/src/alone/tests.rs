@@ -187,13 +187,23 @@ struct Watched {
     sent: Vec<Frame>,
     /// What another station sends next.
     foreign: Option<Frame>,
+    /// What the device answers of its statusword instead of what it has.
+    statusword: Option<u8>,
 }
 
 impl CanPort for Shared<Watched> {
     fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
         let mut watched = self.0.borrow_mut();
         let foreign = watched.foreign.take().map(CanInput::Frame);
-        foreign.or_else(|| watched.bus.receive(now))
+        let input = foreign.or_else(|| watched.bus.receive(now))?;
+        match (input, watched.statusword) {
+            // The answer to an upload of 6041h, two bytes.
+            (CanInput::Frame(frame), Some(word)) if frame.data().starts_with(&[0x4B, 0x41, 0x60, 0]) => {
+                let data = [0x4B, 0x41, 0x60, 0, word, 0, 0, 0];
+                Some(CanInput::Frame(Frame::new(frame.id(), &data).unwrap()))
+            }
+            (input, _) => Some(input),
+        }
     }
 
     fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent {
@@ -207,11 +217,11 @@ fn can() -> Shared<Watched> {
     let rate = BitRate::classic(500_000).unwrap();
     let device = drive(NodeId::new(2).ok(), 1).unwrap();
     let bus = InProcessCan::new(wire::Bus::new(rate), vec![device], None);
-    Shared(Rc::new(RefCell::new(Watched { bus, sent: Vec::new(), foreign: None })))
+    Shared(Rc::new(RefCell::new(Watched { bus, sent: Vec::new(), foreign: None, statusword: None })))
 }
 
 fn open_can(bus: &Shared<Watched>, node: u8) -> Result<Session, String> {
-    let line = CanLine::new(Box::new(bus.clone()), NodeId::new(node).unwrap());
+    let line = CanLine::new(Box::new(bus.clone()), NodeId::new(node).unwrap(), [0]);
     let can = Bus::Can { source: "dictionary", objects: Vec::new() };
     let catalogue = Catalogue::new(vec![can], &Mapping::embedded().unwrap());
     Session::open(Box::new(line), wait(BEGIN), (vec!["x".to_owned()], 0), catalogue, || true)
@@ -243,6 +253,25 @@ fn nothing_but_sdo_is_sent_to_a_canopen_device() {
 }
 
 #[test]
+fn nothing_is_written_to_a_device_that_has_torque() {
+    let bus = can();
+    let mut session = open_can(&bus, 2).unwrap();
+    let before = ask(&mut session, "read x 6081h");
+    // 0x27: in operation; the drive is set to it from elsewhere.
+    bus.0.borrow_mut().statusword = Some(0x27);
+    for request in ["write x 6081h u32:4711", "command x 1010:01 start"] {
+        let id = request.split(' ').nth(2).map(|id| id.replace("6081h", "6081:00")).unwrap();
+        let word = &request[..request.find(' ').unwrap()];
+        let reply =
+            format!("error {word} x torque: {id}: parameters are not written while the drive has torque\n");
+        assert_eq!(ask(&mut session, request), reply);
+    }
+    assert_eq!(ask(&mut session, "read x 6081h"), before);
+    bus.0.borrow_mut().statusword = Some(0x21);
+    assert!(ask(&mut session, "write x 6081h u32:4711").starts_with("ok write x "));
+}
+
+#[test]
 fn a_device_that_is_not_there_does_not_answer() {
     let mut session = open_can(&can(), 5).unwrap();
     let reply = ask(&mut session, "read x 1000h");
@@ -266,7 +295,7 @@ fn a_bus_of_another_master_is_left_alone() {
 
 #[test]
 fn who_does_not_want_to_go_on_is_let_go() {
-    let line = CanLine::new(Box::new(can()), NodeId::new(2).unwrap());
+    let line = CanLine::new(Box::new(can()), NodeId::new(2).unwrap(), [0]);
     let catalogue = Catalogue::new(vec![Bus::Devicenet], &Mapping::embedded().unwrap());
     let opened = Session::open(Box::new(line), wait(BEGIN), (names(), 0), catalogue, || false);
     assert_eq!(opened.err().unwrap(), "interrupted");

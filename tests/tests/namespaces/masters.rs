@@ -40,7 +40,8 @@ fn a_second_master_on_an_interface_is_refused_and_told_who_has_it() {
 
         let config = configuration("masters-second.toml");
         let config = config.to_str().expect("a path in UTF-8");
-        for second in [&["run", "--config", config][..], &["scan", "--interface", "sercos0"]] {
+        let alone = ["param", "read", "turntable", "S-0-0104", "--alone", "--config", config];
+        for second in [&["run", "--config", config][..], &["scan", "--interface", "sercos0"], &alone] {
             let begin = Instant::now();
             let output = in_namespace(&gateway, second).output().expect("it can be started");
             let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -53,6 +54,10 @@ fn a_second_master_on_an_interface_is_refused_and_told_who_has_it() {
         let text = text("masters-first");
         assert!(!text.contains("lost") && !text.contains("south_silence"), "{text}");
         assert_eq!(first.terminate(Duration::from_secs(10)).code(), Some(0));
+        let output = in_namespace(&gateway, &alone).output().expect("it can be started");
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(said.starts_with("S-0-0104 Position loop Kv-factor\n  value      "), "{said}");
         // Whoever comes after it may have the interface.
         let output = in_namespace(&gateway, &["scan", "--interface", "sercos0"]).output().expect("a scan");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

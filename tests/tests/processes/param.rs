@@ -1,9 +1,13 @@
-//! `axisbridge param` with a running gateway: a drive is backed up, replaced by a new one, restored, compared and moved.
+//! `axisbridge param` with a running gateway: a drive is backed up, replaced by a new one, restored, compared and moved; its commands
+//! are executed. The same without a gateway.
 
 use std::fs;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::os::unix::net::UnixListener;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::axisbridge;
@@ -18,12 +22,22 @@ struct Printed {
     errors: String,
 }
 
+impl From<Output> for Printed {
+    fn from(output: Output) -> Self {
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+        Self { code: output.status.code(), out: text(output.stdout), errors: text(output.stderr) }
+    }
+}
+
 fn param(gateway: &Gateway, words: &[&str]) -> Printed {
+    let socket = gateway.socket.to_str().expect("a path");
+    param_with(words, &["--local", socket])
+}
+
+fn param_with(words: &[&str], more: &[&str]) -> Printed {
     let mut command = Command::new(axisbridge());
-    command.arg("param").args(words).arg("--local").arg(&gateway.socket).stdin(Stdio::null());
-    let output = command.output().expect("the command can be started");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
-    Printed { code: output.status.code(), out: text(output.stdout), errors: text(output.stderr) }
+    command.arg("param").args(words).args(more).stdin(Stdio::null());
+    command.output().expect("the command can be started").into()
 }
 
 /// Starts a gateway with drives as they come from their maker, and waits until they are commissioned.
@@ -171,5 +185,184 @@ fn a_canopen_drive_is_backed_up_changed_and_restored() {
         assert_eq!(param(&gateway, &["read", "turntable", "6081h"]).out, before.out);
         assert_eq!(param(&gateway, &["compare", "turntable", name]).code, Some(0));
         stop(gateway);
+    });
+}
+
+/// The objects of a command with `--json`.
+fn objects(printed: &Printed) -> Vec<serde_json::Value> {
+    printed.out.lines().map(|line| serde_json::from_str(line).expect("an object")).collect()
+}
+
+#[test]
+fn a_command_of_a_drive_is_executed_to_its_end() {
+    in_real_time("a_command_of_a_drive_is_executed_to_its_end", || {
+        let gateway = start("param-command");
+        let printed = param(&gateway, &["command", "turntable", "S-0-0264"]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        let beginning = "S-0-0264 Backup working memory procedure command: done after ";
+        assert!(printed.out.starts_with(beginning) && printed.out.ends_with(" s\n"), "{printed:?}");
+        // By its name, as the list has it.
+        let name = "backup working memory procedure command";
+        let printed = param(&gateway, &["command", "turntable", name, "--json"]);
+        let objects = objects(&printed);
+        let states: Vec<_> = objects.iter().map(|object| object["state"].as_str().expect("text")).collect();
+        assert_eq!((printed.code, states), (Some(0), vec!["in-process", "done"]), "{printed:?}");
+        let last = &objects[1];
+        assert_eq!((&last["status"], &last["result"]), (&"0x0003".into(), &"done".into()), "{printed:?}");
+        assert!(
+            last["seconds"].as_f64().is_some_and(|seconds| seconds >= 0.15),
+            "it takes 0.2 s: {printed:?}"
+        );
+        let printed = param(&gateway, &["command", "turntable", "S-0-0264", "--cancel"]);
+        assert_eq!((printed.code, printed.out.as_str()), (Some(0), "S-0-0264: not set\n"), "{printed:?}");
+        let printed = param(&gateway, &["command", "turntable", "S-0-0104"]);
+        assert_eq!((printed.code, printed.out.as_str()), (Some(1), ""));
+        assert_eq!(printed.errors, "S-0-0104 is no procedure command: it is a parameter, which is written\n");
+        stop(gateway);
+    });
+}
+
+/// A socket on which the command of a drive never ends, and what a client asks there.
+struct Endless(JoinHandle<Vec<String>>);
+
+impl Endless {
+    fn new(name: &str) -> (Self, String) {
+        let socket = path(name);
+        let _ = fs::remove_file(&socket);
+        let listener = UnixListener::bind(&socket).expect("the folder of the tests can be written to");
+        let serve = move || {
+            let (stream, _) = listener.accept().expect("a client");
+            let mut asked = Vec::new();
+            let mut reader = BufReader::new(stream);
+            loop {
+                let mut line = String::new();
+                // The end of the client.
+                if reader.read_line(&mut line).unwrap_or(0) == 0 {
+                    return asked;
+                }
+                let (state, status) = if line.ends_with(" cancel\n") {
+                    ("not-set", "0x0000")
+                } else {
+                    ("in-process", "0x0007")
+                };
+                let reply = format!(
+                    "ok command x {{\"id\":\"P-0-0500\",\"state\":\"{state}\",\"status\":\"{status}\"}}\n"
+                );
+                reader.get_mut().write_all(reply.as_bytes()).expect("a connection");
+                asked.push(line);
+            }
+        };
+        let socket = socket.to_str().expect("a path").to_owned();
+        (Self(std::thread::spawn(serve)), socket)
+    }
+
+    /// The first and the last request, once the client has ended.
+    fn asked(self) -> [String; 2] {
+        let asked = self.0.join().expect("a server");
+        [asked[0].clone(), asked[asked.len() - 1].clone()]
+    }
+}
+
+#[test]
+fn a_command_that_does_not_end_in_time_is_cancelled() {
+    let (server, socket) = Endless::new("param-late.socket");
+    let printed =
+        param_with(&["command", "x", "P-0-0500", "--time-limit", "1", "--json"], &["--local", &socket]);
+    let objects = objects(&printed);
+    let last = objects.last().expect("an object");
+    assert_eq!(
+        (printed.code, objects.len()),
+        (Some(1), 2),
+        "one object a state, and the result: {printed:?}"
+    );
+    assert_eq!((&last["state"], &last["result"]), (&"in-process".into(), &"cancelled".into()), "{printed:?}");
+    assert_eq!(last["why"], "not done within 1 s");
+    assert_eq!(server.asked(), ["command x P-0-0500 start\n", "command x P-0-0500 cancel\n"]);
+}
+
+/// Waits for the end of a process.
+fn ended(mut child: Child) -> Printed {
+    let end = Instant::now() + Duration::from_secs(30);
+    while child.try_wait().expect("a child").is_none() {
+        assert!(Instant::now() < end, "it does not end");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.wait_with_output().expect("its output").into()
+}
+
+#[test]
+fn an_interrupted_command_is_cancelled() {
+    let (server, socket) = Endless::new("param-interrupted.socket");
+    let mut command = Command::new(axisbridge());
+    command.args(["param", "command", "x", "P-0-0500", "--local", &socket]);
+    let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let child = child.expect("the command can be started");
+    std::thread::sleep(Duration::from_millis(700));
+    let interrupt = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(interrupt.expect("kill").success());
+    let printed = ended(child);
+    assert_eq!((printed.code, printed.out.as_str()), (Some(1), ""), "{printed:?}");
+    assert!(printed.errors.starts_with("P-0-0500: interrupted, and cancelled after "), "{printed:?}");
+    assert_eq!(server.asked(), ["command x P-0-0500 start\n", "command x P-0-0500 cancel\n"]);
+}
+
+/// The drives are in the process of the command: each command has new ones.
+#[test]
+fn drives_are_accessed_without_a_gateway() {
+    in_real_time("drives_are_accessed_without_a_gateway", || {
+        let config = |name: &str, text: &str| {
+            let file = path(name);
+            fs::write(&file, text).expect("the folder of the tests can be written to");
+            file.to_str().expect("a path").to_owned()
+        };
+        let sercos = config("alone-sercos.toml", include_str!("../../../examples/two-axes-in-process.toml"));
+        let can = config("alone-can.toml", include_str!("../virtual_time/can.toml"));
+        let sercos = |words: &[&str]| param_with(words, &["--alone", "--config", &sercos]);
+        let can = |words: &[&str]| param_with(words, &["--alone", "--config", &can]);
+
+        // Protected in operation, and not in CP2.
+        let printed = sercos(&["write", "turntable", "S-0-0121", "5"]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert!(
+            printed.out.starts_with("S-0-0121 = 5") && printed.out.ends_with(" (was 1)\n"),
+            "{printed:?}"
+        );
+        let file = path("alone-backup.toml");
+        let _ = fs::remove_file(&file);
+        let name = file.to_str().expect("a path");
+        let printed = sercos(&["backup", "turntable", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert_eq!(sercos(&["compare", "turntable", name]).code, Some(0));
+        let gear = "id = \"S-0-0121\"\n";
+        let text = fs::read_to_string(&file).expect("the backup");
+        let at = text.find(gear).expect("the gear");
+        let (before, after) = text.split_at(at);
+        let after = after.replacen("data = \"01000000\"", "data = \"05000000\"", 1);
+        fs::write(&file, format!("{before}{after}")).expect("the backup");
+        let printed = sercos(&["restore", "turntable", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert!(
+            printed.out.contains("\n1 of ") && printed.out.contains(" 0 were not restored\n"),
+            "{printed:?}"
+        );
+        let printed = sercos(&["command", "slide", "S-0-0264"]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        let printed = sercos(&["list", "turntable", "--commands"]);
+        assert!(printed.out.ends_with(" parameters, from S-0-0025 of the drive\n"), "{printed:?}");
+
+        let printed = can(&["write", "turntable", "6091h.1", "3"]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert_eq!(printed.out, "6091:01 = 3 motor revolutions (was 1)\n");
+        let printed = can(&["command", "turntable", "1010:01"]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        let printed = can(&["write", "turntable", "6040h", "15"]);
+        assert_eq!((printed.code, printed.out.as_str()), (Some(1), ""));
+        assert_eq!(printed.errors, "6040:00 is not written: the gateway commands the drive with it\n");
+
+        let printed = can(&["read", "nobody", "6081h"]);
+        assert_eq!((printed.code, printed.out.as_str()), (Some(1), ""));
+        assert_eq!(printed.errors, "unknown axis `nobody`: expected turntable, slide\n");
+        let printed = param_with(&["read", "turntable", "6081h"], &["--alone"]);
+        assert_eq!(printed.code, Some(2), "the command line is wrong: {printed:?}");
     });
 }

@@ -108,7 +108,8 @@ fn line(config: &Config, axis: &Axis) -> Result<Box<dyn Line>, CliError> {
                 Box::new(InProcessCan::of(can, tap).in_host_time(can.cycle_time))
             });
             let port = port.map_err(|error: StartError| occupied(&error))?;
-            Ok(Box::new(CanLine::new(port, drive.node)))
+            let axes = can.drives.iter().filter(|other| other.node == drive.node).map(|other| other.axis);
+            Ok(Box::new(CanLine::new(port, drive.node, axes)))
         }
         DriveAt::Devicenet { .. } => Err(format!(
             "expected an axis on SERCOS III or CANopen: the drive of `{}` is on DeviceNet, whose parameters need a gateway that runs",
