@@ -6,9 +6,9 @@ use profile_sercos::wire::attribute::{Attribute, ItemLength};
 use profile_sercos::wire::idn::Idn;
 
 use crate::config::Written;
-use crate::config::file::{CanDriveTable, DriveTable};
+use crate::config::file::{CanDriveTable, DevicenetDriveTable, DriveTable};
 use crate::engine::build::startup::Reserved;
-use crate::engine::build::{can, sercos};
+use crate::engine::build::{can, devicenet, sercos};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source, Spanned};
 use crate::mapping::{Cia402Type, IdnUnit, Mapping};
@@ -54,6 +54,22 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
                     known.iter().find(|known| known.object == object).and_then(|known| known.data_type);
                 if list.is_free(entry, table.parameter.span(), &reserved) {
                     list.object(entry, table.parameter.span(), table.value.span(), known);
+                }
+            }
+        }
+        if let Some((network, drive)) =
+            written.config.devicenet_drive(axis).filter(|(_, drive)| !drive.startup.is_empty())
+        {
+            // Why there are none is found elsewhere.
+            let Ok(parts) = devicenet::parts(network, drive, axis, mapping) else { continue };
+            let reserved = Reserved::of_devicenet(&parts.steps);
+            let mut tables = south.devicenet.iter().flat_map(|table| &table.get_ref().drive);
+            let named = |table: &&Spanned<DevicenetDriveTable>| is_named(&table.get_ref().name, &drive.name);
+            let Some(table) = tables.find(named) else { continue };
+            for (entry, table) in own(&drive.startup, &table.get_ref().startup, |table| &table.parameter) {
+                if list.is_free(entry, table.parameter.span(), &reserved) {
+                    // No table has the types of attributes.
+                    list.object(entry, table.parameter.span(), table.value.span(), None);
                 }
             }
         }

@@ -9,6 +9,7 @@ use profile_generic::ratio::Ratio;
 use profile_generic::time::DurationNs;
 
 use super::CanLink;
+use crate::parameter::startup::StartupEntry;
 
 /// A DeviceNet network.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,6 +52,8 @@ pub struct DevicenetDrive {
     pub identity: ExpectedIdentity,
     /// Nanounits of a linear axis in a nanoturn.
     pub way_of_a_turn: Option<Ratio>,
+    /// What parameters of the drive have to be before it takes part in the cycle.
+    pub startup: Vec<StartupEntry>,
     /// What it is.
     pub kind: DevicenetKind,
 }

@@ -686,4 +686,30 @@ pub struct DevicenetDriveTable {
     /// 2^SpeedScale. Default: 0.
     #[schemars(range(min = -15, max = 15))]
     pub speed_scale: Option<Spanned<i64>>,
+    /// What attributes of the drive have to be before it takes part in the cycle: its start-up list. Default: none.
+    #[serde(default)]
+    pub startup: Vec<Spanned<AttributeStartupTable>>,
+    /// What is done when the drive has another value, for entries that do not say it: `"write"` writes the value and reads it back,
+    /// `"refuse"` does not use the drive, `"warn"` logs it. Default: `"write"`.
+    #[schemars(transform = form::word(&OnDifference::NAMED))]
+    pub on_startup_difference: Option<Spanned<String>>,
+}
+
+/// `[[south.devicenet.drive.startup]]`: an entry of the start-up list of a drive on DeviceNet.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AttributeStartupTable {
+    /// Class, instance and attribute, such as `"0x2A.1.22"` or `"66.1.504"`; decimal, or with `0x` hexadecimal.
+    #[schemars(transform = form::attribute)]
+    pub parameter: Spanned<String>,
+    /// The value: a number, or a text as `axisbridge param read` shows it, such as `"hex:0a00"`.
+    pub value: Spanned<Scalar>,
+    /// The type of the attribute, such as `"f32"` for a REAL or `"i8"` for a SINT. Required unless the value has its own, as `"hex:0a00"`
+    /// and `"u16:5"` have.
+    #[serde(rename = "type")]
+    #[schemars(transform = form::word(Cia402Type::NAMED))]
+    pub kind: Option<Spanned<String>>,
+    /// What is done when the drive has another value. Default: `on_startup_difference` of the drive.
+    #[schemars(transform = form::word(&OnDifference::NAMED))]
+    pub on_difference: Option<Spanned<String>>,
 }

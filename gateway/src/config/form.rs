@@ -81,6 +81,12 @@ pub fn object(schema: &mut Schema) {
     pattern(schema, format!("^({marked}(\\.({OCTET}|0x{sub}))?|({marked}|{index}):{sub})$"));
 }
 
+/// Class, instance and attribute of a drive on DeviceNet.
+pub fn attribute(schema: &mut Schema) {
+    let number = "(0*[0-9]{1,5}|0x0*[0-9A-Fa-f]{1,4})";
+    pattern(schema, format!("^{number}\\.{number}\\.{number}$"));
+}
+
 /// A number above zero.
 pub fn positive(schema: &mut Schema) {
     schema.insert("exclusiveMinimum".to_owned(), Value::from(0));

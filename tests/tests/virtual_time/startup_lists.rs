@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use axisbridge::simulate::devicenet_drive::DevicenetNode;
 use axisbridge::simulate::drives::linear;
 use axisbridge_tests::rig::motion::{NANO, TURNTABLE, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
@@ -53,6 +54,27 @@ fn can(keys: &str, entries: &[String]) -> Settings {
     let drive = "name = \"drive-a\"\nnode = 1\n";
     let configuration = with(include_str!("can.toml"), drive, "can", keys, &entries.concat());
     Settings { configuration, drives: Vec::new(), ..Settings::default() }
+}
+
+fn devicenet(keys: &str, entries: &[String]) -> Settings {
+    let drive = "name = \"drive-a\"\nmac_id = 5\n";
+    let configuration = include_str!("devicenet.toml");
+    // The keys of the drive come ahead of its entries.
+    let (resolution, rest) = ("resolution = 1_048_576\n", format!("{drive}resolution = 1_048_576\n"));
+    assert!(configuration.contains(&rest));
+    let keys = format!("{resolution}{keys}");
+    let configuration =
+        with(&configuration.replacen(&rest, drive, 1), drive, "devicenet", &keys, &entries.concat());
+    Settings { configuration, drives: Vec::new(), ..Settings::default() }
+}
+
+/// An attribute of the Motion Device Axis Object of the first drive, a REAL.
+fn real(rig: &Rig, id: u16) -> f32 {
+    let Some(DevicenetNode::Motion(slave)) = rig.devicenet[0].bus.nodes().next() else {
+        panic!("a CIP Motion drive")
+    };
+    let bytes = slave.application().device().attribute(0, id).expect("the attribute");
+    f32::from_le_bytes(bytes.try_into().expect("a REAL"))
 }
 
 /// Lines of the log about start-up lists.
@@ -422,4 +444,82 @@ fn a_backup_is_a_list() {
         "{told:#?}"
     );
     assert_eq!(held(&rig, Idn::standard(121)), 1, "nothing is written to it");
+}
+
+/// Torque Limit - Positive (504) and Acceleration Limit (485) of the Motion Device Axis Object.
+const TORQUE: &str = "0x42.1.504";
+const ACCELERATION: &str = "66.1.485";
+
+#[test]
+fn what_a_devicenet_drive_has_otherwise_is_written_before_it_is_used_and_each_time_it_is_taken() {
+    let entries = [
+        entry(TORQUE, "80.5", "type = \"f32\""),
+        entry(ACCELERATION, "\"hex:00007a44\"", "on_difference = \"write\""),
+    ];
+    let mut rig = Rig::new(devicenet("", &entries));
+    assert_eq!((real(&rig, 504), real(&rig, 485)), (0.0, 0.0), "as it comes from its maker");
+    rig.until_ready();
+    assert_eq!((real(&rig, 504), real(&rig, 485)), (80.5, 1_000.0), "{}", rig.told());
+    let written = [
+        "axis 1: start-up list: 66.1.504 was 0 and is set to 80.5",
+        "axis 1: start-up list: 66.1.485 was hex:00000000 and is set to hex:00007a44",
+        "axis 1: start-up list: 2 entries hold, 2 of them written",
+    ];
+    assert_eq!(told(&rig), written, "{}", rig.told());
+    assert!(rig.engine.axes().iter().all(|axis| axis.south().is_some()), "{}", rig.told());
+    // Lost and taken anew, it has forgotten both, and gets them again.
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, false);
+    rig.run_for(millis(500));
+    assert_ne!(rig.engine.axes()[0].state(), DriveState::Inhibited, "{}", rig.told());
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, true);
+    rig.run_until(millis(20_000), "the list again", |rig| told(rig).len() == 6);
+    assert_eq!(told(&rig)[3..], written);
+    assert_eq!((real(&rig, 504), real(&rig, 485)), (80.5, 1_000.0));
+    rig.run_until(millis(5_000), "the axis", |rig| rig.engine.axes()[0].state() == DriveState::Inhibited);
+}
+
+#[test]
+fn a_devicenet_drive_that_is_not_as_its_list_says_is_left_out_and_the_other_goes_on() {
+    let cases = [
+        (
+            entry(TORQUE, "80.5", "type = \"f32\"\non_difference = \"refuse\""),
+            "66.1.504 is 0, expected 80.5 (on_difference = \"refuse\")",
+        ),
+        // Control Status can only be read.
+        (
+            entry("0x42.1.40", "99", "type = \"u8\""),
+            "writing 66.1.40 = 99 (it is 1): the drive refuses it with status 0x0e: ",
+        ),
+        (entry("0x77.1.3", "1", "type = \"u8\""), "119.1.3: the drive refuses it with status 0x16: "),
+    ];
+    for (entry, why) in cases {
+        let mut rig = Rig::new(devicenet("", &[entry]));
+        rig.run_for(millis(3_000));
+        let told = told(&rig);
+        let line = format!("axis 1: the start-up list of the drive failed: {why}");
+        assert!(
+            told.iter().any(|told| told.starts_with(&line)),
+            "expected {line}\n{told:#?}\n{}",
+            rig.told()
+        );
+        assert_eq!(real(&rig, 504), 0.0, "nothing was written");
+        let [left_out, good] = rig.engine.axes() else { panic!("two axes") };
+        assert!(left_out.south().is_none() && good.south().is_some(), "{why}: {}", rig.told());
+    }
+}
+
+#[test]
+fn a_devicenet_drive_with_another_value_is_used_with_a_warning() {
+    let entries = [entry(TORQUE, "80.5", "type = \"f32\"")];
+    let mut rig = Rig::ready(devicenet("on_startup_difference = \"warn\"\n", &entries));
+    rig.run_for(millis(100));
+    assert_eq!(real(&rig, 504), 0.0);
+    let expected = [
+        "axis 1: start-up list: 66.1.504 is 0, expected 80.5; the drive is used nevertheless (on_difference = \"warn\")",
+        "axis 1: start-up list: 0 entries hold, 0 of them written",
+    ];
+    assert_eq!(told(&rig), expected, "{}", rig.told());
+    assert!(rig.engine.axes()[0].south().is_some());
 }

@@ -7,7 +7,7 @@ use profile_cip::devicenet::wire::speed::Assembly;
 use profile_generic::time::DurationNs;
 
 use super::can::MODES;
-use super::{Problems, can, value};
+use super::{Problems, can, startup, value};
 use crate::config::file::{DevicenetDriveTable, DevicenetTable};
 use crate::config::{Devicenet, DevicenetDrive, DevicenetKind, duration};
 use crate::finding::registry as code;
@@ -145,6 +145,7 @@ fn check_drive(
         Some(Kind::Speed) => speed_drive(problems, table),
         None => None,
     };
+    let startup = startup::devicenet(problems, table);
     let identity = ExpectedIdentity { vendor: vendor?, product_code: product?, ..Default::default() };
     Some(DevicenetDrive {
         name: name?,
@@ -152,6 +153,7 @@ fn check_drive(
         packet_rate_ms: packet_rate?,
         identity,
         way_of_a_turn: way_of_a_turn?,
+        startup: startup?,
         kind: kind?,
     })
 }

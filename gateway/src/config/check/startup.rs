@@ -1,7 +1,9 @@
 //! The start-up lists of drives, as far as they can be judged without tables: numbers, words, values of a type, each parameter once.
 
 use super::{Problems, value};
-use crate::config::file::{CanDriveTable, DriveTable, ObjectStartupTable, StartupTable};
+use crate::config::file::{
+    AttributeStartupTable, CanDriveTable, DevicenetDriveTable, DriveTable, ObjectStartupTable, StartupTable,
+};
 use crate::config::scalar::Scalar;
 use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
@@ -13,9 +15,10 @@ use crate::parameter::value::Kind;
 /// Entries of a list.
 const ENTRIES_MAX: usize = 4_096;
 
-/// What an IDN and an object look like.
+/// What an IDN, an object and an attribute look like.
 const IDN: &str = "an IDN such as \"S-0-0121\", \"P-0-0123\" or \"S-0-1300.0.3\"";
 const OBJECT: &str = "an object such as \"6091:01\", \"0x6091.1\" or \"2001h\"";
+const PATH: &str = "class, instance and attribute such as \"0x2A.1.22\" or \"66.1.504\"";
 
 /// An entry as it is written.
 struct Row<'t> {
@@ -50,6 +53,19 @@ pub(super) fn can(problems: &mut Problems, table: &CanDriveTable) -> Option<Vec<
     file(problems, table.startup_file.as_ref());
     let usual = table.on_startup_difference.as_ref();
     list(problems, &table.startup, usual, OBJECT, |id| matches!(id, Id::Object(_)))
+}
+
+impl<'t> From<&'t AttributeStartupTable> for Row<'t> {
+    fn from(table: &'t AttributeStartupTable) -> Self {
+        let AttributeStartupTable { parameter, value, kind, on_difference } = table;
+        Row { parameter, value, kind: kind.as_ref(), on_difference: on_difference.as_ref() }
+    }
+}
+
+/// The list of a drive on DeviceNet.
+pub(super) fn devicenet(problems: &mut Problems, table: &DevicenetDriveTable) -> Option<Vec<StartupEntry>> {
+    let usual = table.on_startup_difference.as_ref();
+    list(problems, &table.startup, usual, PATH, |id| matches!(id, Id::Path { .. }))
 }
 
 /// The entries of a list whose parameters have to look like `expected`.
@@ -176,6 +192,10 @@ mod tests {
         checked(&format!("name = \"a\"\nnode = 1\n{keys}"), can)
     }
 
+    fn of_devicenet(keys: &str) -> Result<Vec<StartupEntry>, Vec<String>> {
+        checked(&format!("name = \"a\"\nmac_id = 1\n{keys}"), devicenet)
+    }
+
     #[test]
     fn values_are_numbers_and_texts_and_the_drive_has_a_usual_reaction() {
         let list = of_sercos(
@@ -196,6 +216,10 @@ mod tests {
             of_can("[[startup]]\nparameter = \"6091:01\"\nvalue = -3\ntype = \"i32\"\n").expect("a list");
         assert_eq!((list[0].data_type, list[0].on_difference), (Some(Cia402Type::I32), OnDifference::Write));
         assert_eq!(list[0].bytes(Kind::Object(Cia402Type::I32)), Ok(vec![0xFD, 0xFF, 0xFF, 0xFF]));
+        let list = of_devicenet("[[startup]]\nparameter = \"0x42.1.504\"\nvalue = 80.5\ntype = \"f32\"\n");
+        let list = list.expect("a list");
+        assert_eq!((list[0].id.to_string().as_str(), list[0].data_type), ("66.1.504", Some(Cia402Type::F32)));
+        assert_eq!(list[0].bytes(Kind::Object(Cia402Type::F32)), Ok(80.5_f32.to_le_bytes().to_vec()));
     }
 
     #[test]
@@ -221,6 +245,14 @@ mod tests {
             ("6091:01", "value = 1.5\ntype = \"u32\"", "the value is not a u32"),
         ] {
             assert_eq!(titles(of_can(&entry(parameter, rest))), [expected]);
+        }
+        for (parameter, rest, expected) in [
+            ("0x42.504", "value = 1", "`0x42.504` is not the number of a parameter"),
+            ("6091:01", "value = 1", "`6091:01` is a number of CANopen drives"),
+            ("0x42.1.504", "value = 1\ntype = \"real\"", "unknown type of an object `real`"),
+            ("0x2A.1.22", "value = 200\ntype = \"i8\"", "the value is not a i8"),
+        ] {
+            assert_eq!(titles(of_devicenet(&entry(parameter, rest))), [expected]);
         }
         let twice = format!("{}{}", entry("S-0-0121", "value = 1"), entry("s-0-121", "value = 2"));
         assert_eq!(titles(of_sercos(&twice)), ["the parameter S-0-0121 is used twice"]);

@@ -7,8 +7,9 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::ratio::Ratio;
 use profile_generic::scaling::{NANO, UnitKind};
 
-use super::{BuildError, kind, parameters};
+use super::{BuildError, kind, parameters, startup};
 use crate::config::{Axis, AxisFunction, Config, Devicenet, DevicenetDrive, DevicenetKind, DriveAt};
+use crate::engine::bus::devicenet::commissioner::{Commissioner, commissioner};
 use crate::engine::bus::devicenet::end::{End, MotionLink, SpeedLink};
 use crate::engine::bus::devicenet::setup::{SetupStep, motion_steps, speed_steps};
 use crate::engine::bus::devicenet::{DevicenetBus, DrivePlan};
@@ -62,20 +63,32 @@ fn axis_of(config: &Config, network: usize, drive: usize) -> Option<(usize, &Axi
     config.axes.iter().enumerate().find(|(_, axis)| axis.drive == at)
 }
 
-/// A network.
-pub(super) fn bus(config: &Config, place: usize, mapping: &Mapping) -> Result<DevicenetBus, BuildError> {
+/// A network, and what goes through the start-up lists of its drives.
+pub(super) fn bus(
+    config: &Config,
+    place: usize,
+    mapping: &Mapping,
+) -> Result<(DevicenetBus, Commissioner), BuildError> {
     let network = &config.devicenet[place];
     let mut drives = Vec::with_capacity(network.drives.len());
+    let mut lists = Vec::with_capacity(network.drives.len());
     for (number, drive) in network.drives.iter().enumerate() {
         if let Some((number, axis)) = axis_of(config, place, number) {
             let made = plan(network, drive, axis, number, mapping);
-            drives.push(made.map_err(|error| BuildError::DevicenetDrive { name: axis.name.clone(), error })?);
+            let mut made =
+                made.map_err(|error| BuildError::DevicenetDrive { name: axis.name.clone(), error })?;
+            let list = startup::of_devicenet(&drive.startup, &made.steps);
+            made.has_list = !list.is_empty();
+            lists.push((number, list));
+            drives.push(made);
         }
     }
     let name = network.link.interface().unwrap_or("in-process");
     let number = u8::try_from(place).unwrap_or(u8::MAX);
-    DevicenetBus::new(number, master(config, place), drives)
-        .map_err(|error| BuildError::Devicenet { network: name.to_owned(), error })
+    let (commissioner, end) = commissioner(lists.iter().map(|(axis, list)| (*axis, list.as_slice())));
+    let bus = DevicenetBus::new(number, master(config, place), drives, end)
+        .map_err(|error| BuildError::Devicenet { network: name.to_owned(), error })?;
+    Ok((bus, commissioner))
 }
 
 fn plan(
@@ -86,7 +99,7 @@ fn plan(
     mapping: &Mapping,
 ) -> Result<DrivePlan, DevicenetError> {
     let Parts { end, program, steps, .. } = parts(network, drive, axis, mapping)?;
-    Ok(DrivePlan { axis: number, mac: drive.mac, end, program, steps })
+    Ok(DrivePlan { axis: number, mac: drive.mac, end, program, has_list: false, steps })
 }
 
 /// What a drive is led by.

@@ -187,7 +187,9 @@ fn buses(config: &Config, host: Host, mapping: &Mapping) -> Result<(Buses, Commi
     }
     let behind_can = list.len();
     for place in 0..config.devicenet.len() {
-        list.push(AnyBus::Devicenet(Box::new(devicenet::bus(config, place, mapping)?)));
+        let (bus, commissioner) = devicenet::bus(config, place, mapping)?;
+        list.push(AnyBus::Devicenet(Box::new(bus)));
+        commissioners.devicenet.push(commissioner);
     }
     let of = config.axes.iter().map(|axis| match axis.drive {
         DriveAt::Sercos { .. } => 0,
@@ -202,19 +204,23 @@ fn buses(config: &Config, host: Host, mapping: &Mapping) -> Result<(Buses, Commi
 pub struct Commissioners {
     sercos: Option<bus::sercos::commissioner::Commissioner>,
     can: Vec<bus::can::commissioner::Commissioner>,
+    devicenet: Vec<bus::devicenet::commissioner::Commissioner>,
 }
 
 impl Commissioners {
     /// Whether the cycle thread has gone.
     #[must_use]
     pub fn is_abandoned(&self) -> bool {
-        self.sercos.iter().all(|one| one.is_abandoned()) && self.can.iter().all(|one| one.is_abandoned())
+        self.sercos.iter().all(|one| one.is_abandoned())
+            && self.can.iter().all(|one| one.is_abandoned())
+            && self.devicenet.iter().all(|one| one.is_abandoned())
     }
 
     /// Does what there is to do, without waiting.
     pub fn poll(&mut self) {
         self.sercos.iter_mut().for_each(|one| one.poll());
         self.can.iter_mut().for_each(|one| one.poll());
+        self.devicenet.iter_mut().for_each(|one| one.poll());
     }
 }
 

@@ -1,7 +1,8 @@
 //! What of the start-up list of a drive is used: not what the gateway sets itself.
 
 use crate::config::{Can, CanDrive};
-use crate::mapping::{Cia402Axis, DriveFacts, Item, Mapping, SercosAxis, Telegram};
+use crate::engine::bus::devicenet::setup::SetupStep;
+use crate::mapping::{Attribute, Cia402Axis, DriveFacts, Item, Mapping, SercosAxis, Telegram};
 use crate::parameter::id::Id;
 use crate::parameter::known::{belongs_to_gateway, is_of, objects};
 use crate::parameter::startup::{StartupEntry, StartupValue};
@@ -32,6 +33,16 @@ impl Reserved {
         let written = mapping.cia402_written(needs);
         let written = written.into_iter().map(Id::Object).collect();
         Self { cyclic: ids(&telegram), written, axis: Some(needs.axis) }
+    }
+
+    /// Those of a drive on DeviceNet that is set up by these steps.
+    #[must_use]
+    pub fn of_devicenet(steps: &[SetupStep]) -> Self {
+        let path = |step: &SetupStep| {
+            let Attribute { class, id } = step.attribute;
+            Id::Path { class, instance: 1, attribute: id }
+        };
+        Self { cyclic: Vec::new(), written: steps.iter().map(path).collect(), axis: None }
     }
 
     /// Why a list has no say in a parameter; `None` where it has.
@@ -92,4 +103,11 @@ pub fn of_can(bus: &Can, drive: &CanDrive, needs: &Cia402Axis, mapping: &Mapping
         StartupEntry { data_type: entry.data_type.or(found), ..entry.clone() }
     };
     drive.startup.iter().filter(|entry| reserved.why(entry.id).is_none()).map(typed).collect()
+}
+
+/// The list of a drive on DeviceNet that is set up by these steps.
+#[must_use]
+pub fn of_devicenet(startup: &[StartupEntry], steps: &[SetupStep]) -> Vec<StartupEntry> {
+    let reserved = Reserved::of_devicenet(steps);
+    startup.iter().filter(|entry| reserved.why(entry.id).is_none()).cloned().collect()
 }

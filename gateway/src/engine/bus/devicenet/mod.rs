@@ -4,9 +4,11 @@
 //! beside the exchange, and only then its axis has a program. A drive that is lost is taken again by the master, with pauses
 //! that grow, and goes the same way; the others go on.
 //!
-//! Everything that a drive can need is made before the start: nothing here allocates, so there is no commissioner.
+//! Everything that a drive can need is made before the start: nothing here allocates. Only its start-up list is gone through by the
+//! [`commissioner`], alongside the cycle thread.
 
 pub mod access;
+pub mod commissioner;
 pub mod direct;
 pub mod end;
 pub mod setup;
@@ -20,12 +22,14 @@ use profile_cip::devicenet::wire::MacId;
 use profile_generic::can::{Frame, Id};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
+use self::commissioner::ListWork;
 use self::direct::DirectAccess;
 use self::end::{End, MessageError, Row};
 use self::setup::{SetupFailure, SetupStep};
 use super::accesses::Accesses;
 use super::backoff::Backoff;
 use super::can_link::{CanLink, PATIENCE, Station};
+use super::commissioner::{CommissionerHandle, Done, Job, Run};
 use super::direct_slot::DirectSlot;
 use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
 use crate::engine::access::{Access, Data, Operation, Progress};
@@ -48,6 +52,8 @@ const ACCESSES_MAX: usize = 2;
 enum Stage {
     /// The master takes it, or it is not there.
     Absent,
+    /// Its start-up list is gone through: the request that is under way.
+    List(Option<Ticket>),
     /// It is set up: the step, and the request that is under way.
     Setup(usize, Option<Ticket>),
     /// Its axis is led.
@@ -67,6 +73,8 @@ pub struct DrivePlan {
     pub end: End,
     /// How its axis speaks to it. Without anything on the heap, because it is copied in the cycle.
     pub program: DriveProgram,
+    /// Whether it has a start-up list, which comes before the set-up.
+    pub has_list: bool,
     /// How it is set up.
     pub steps: Vec<SetupStep>,
 }
@@ -75,6 +83,10 @@ pub struct DrivePlan {
 struct Drive {
     plan: DrivePlan,
     stage: Stage,
+    /// Its list is through since it was taken.
+    is_listed: bool,
+    /// Times that its list was begun.
+    runs: u32,
     command: Row,
     feedback: Row,
     fresh: bool,
@@ -103,6 +115,7 @@ pub struct DevicenetBus {
     cycles_seen: u64,
     /// Messages of drives that did not count.
     refused: u64,
+    commissioner: CommissionerHandle<ListWork>,
     direct: DirectSlot<Ticket>,
     /// The direct access that is in progress, and its buffer.
     direct_access: Option<(DirectAccess, Vec<u8>)>,
@@ -123,10 +136,17 @@ impl DevicenetBus {
     ///
     /// # Errors
     /// What the master finds wrong with its configuration.
-    pub fn new(number: u8, config: MasterConfig, drives: Vec<DrivePlan>) -> Result<Self, ConfigError> {
+    pub fn new(
+        number: u8,
+        config: MasterConfig,
+        drives: Vec<DrivePlan>,
+        commissioner: CommissionerHandle<ListWork>,
+    ) -> Result<Self, ConfigError> {
         let drive = |plan| Drive {
             plan,
             stage: Stage::Absent,
+            is_listed: false,
+            runs: 0,
             command: [0; ROW_LEN],
             feedback: [0; ROW_LEN],
             fresh: false,
@@ -146,6 +166,7 @@ impl DevicenetBus {
             drives,
             cycles_seen: 0,
             refused: 0,
+            commissioner,
             direct: DirectSlot::new(),
             direct_access: None,
             link: CanLink::new(cycle),
@@ -241,8 +262,16 @@ impl DevicenetBus {
             let result = access.result(outcome, &mut data).map(|()| None);
             return self.direct.end(DirectResult { result, data });
         }
-        for drive in &mut self.drives {
+        for (place, drive) in self.drives.iter_mut().enumerate() {
             let axis = drive.plan.axis;
+            if drive.stage == Stage::List(Some(ticket)) {
+                let run = Run::new(place, drive.runs);
+                // Room was made sure of before the request was sent. A drive that was lost is taken anew, with a list anew.
+                let goes_on = !matches!(outcome, Outcome::Lost)
+                    && self.commissioner.push(Job::Outcome(run, outcome.clone()));
+                drive.stage = if goes_on { Stage::List(None) } else { Stage::Absent };
+                return;
+            }
             if let Stage::Setup(step, Some(known)) = drive.stage
                 && known == ticket
             {
@@ -267,10 +296,43 @@ impl DevicenetBus {
         }
     }
 
+    /// Takes what the commissioner has done.
+    fn commission(&mut self, now: MonotonicTime, notice: &mut dyn FnMut(Notice)) {
+        while let Some((run, done)) = self.commissioner.pop(notice) {
+            let place = usize::from(run.place);
+            let wanted = self.drives.get_mut(place);
+            let wanted =
+                wanted.filter(|drive| Run::new(place, drive.runs) == run && drive.stage == Stage::List(None));
+            let Some(drive) = wanted else {
+                self.commissioner.push(Job::Unused(done));
+                continue;
+            };
+            match done {
+                Done::Submit(run, request) => {
+                    match self.master.submit(drive.plan.mac, request.clone()) {
+                        Ok(ticket) => drive.stage = Stage::List(Some(ticket)),
+                        // It begins anew.
+                        Err(_) => {
+                            drive.stage = Stage::Setup(0, None);
+                            self.commissioner.push(Job::Unsent(run, request));
+                        }
+                    }
+                }
+                Done::Made(..) => (drive.stage, drive.is_listed) = (Stage::Setup(0, None), true),
+                Done::Failed(_, failed) => {
+                    notice(failed);
+                    (drive.stage, drive.tried) = (Stage::Unfit, true);
+                    drive.backoff.begin(now);
+                }
+                Done::Told(_) => {}
+            }
+        }
+    }
+
     /// Takes each drive on as far as it goes now.
     fn lead_on(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
-        let Self { master, drives, .. } = self;
-        for drive in drives {
+        let Self { master, drives, commissioner, .. } = self;
+        for (place, drive) in drives.iter_mut().enumerate() {
             let axis = drive.plan.axis;
             if master.phase(drive.plan.mac) != Some(Phase::Exchange) {
                 if drive.stage == Stage::Ready {
@@ -285,9 +347,18 @@ impl DevicenetBus {
                 Stage::Absent => {
                     drive.plan.end.restart();
                     drive.fresh = false;
-                    drive.stage = Stage::Setup(0, None);
+                    (drive.stage, drive.is_listed) = (Stage::Setup(0, None), false);
                 }
-                Stage::Unfit if drive.backoff.take(now) => drive.stage = Stage::Setup(0, None),
+                Stage::Unfit if drive.backoff.take(now) => {
+                    (drive.stage, drive.is_listed) = (Stage::Setup(0, None), false);
+                }
+                Stage::Setup(0, None) if drive.plan.has_list && !drive.is_listed => {
+                    let run = Run::new(place, drive.runs.wrapping_add(1));
+                    // A full queue is tried again in the next call.
+                    if drive.plan.end.is_answered() && commissioner.push(Job::Order(run, ())) {
+                        (drive.stage, drive.runs) = (Stage::List(None), run.number);
+                    }
+                }
                 Stage::Setup(step, None) if drive.plan.end.is_answered() => {
                     if let Some(step_of) = drive.plan.steps.get(step) {
                         // A full queue is tried again in the next call.
@@ -300,7 +371,7 @@ impl DevicenetBus {
                         axes[axis].set_south(drive.plan.program.clone());
                     }
                 }
-                Stage::Setup(..) | Stage::Unfit | Stage::Ready => {}
+                Stage::List(_) | Stage::Setup(..) | Stage::Unfit | Stage::Ready => {}
             }
         }
     }
@@ -457,6 +528,7 @@ impl South for DevicenetBus {
                 self.master.give_way(now, drive.plan.mac);
             }
         }
+        self.commission(now, notice);
         self.lead_on(now, system, axes);
         self.tell_errors(notice);
         for place in 0..self.drives.len() {
@@ -491,7 +563,7 @@ impl South for DevicenetBus {
         let Some(message) = master.producer(mac, POLL).filter(|_| exchanging) else { return };
         let written = match drive.stage {
             Stage::Ready => given && drive.plan.end.emit(&drive.command, message),
-            Stage::Setup(..) => drive.plan.end.emit_neutral(message),
+            Stage::List(_) | Stage::Setup(..) => drive.plan.end.emit_neutral(message),
             Stage::Absent | Stage::Unfit => false,
         };
         if written {
