@@ -477,7 +477,7 @@ fn what_a_devicenet_drive_has_otherwise_is_written_before_it_is_used_and_each_ti
     rig.run_until(millis(20_000), "the list again", |rig| told(rig).len() == 6);
     assert_eq!(told(&rig)[3..], written);
     assert_eq!((real(&rig, 504), real(&rig, 485)), (80.5, 1_000.0));
-    rig.run_until(millis(5_000), "the axis", |rig| rig.engine.axes()[0].state() == DriveState::Inhibited);
+    rig.run_until(millis(5_000), "the drive", |rig| rig.engine.axes()[0].south().is_some());
 }
 
 #[test]
