@@ -80,8 +80,7 @@ impl CanLine {
     fn send(&mut self, now: MonotonicTime) -> Result<(), String> {
         self.again = None;
         loop {
-            let held = self.held.take();
-            let next = held.map(|(frame, since)| (frame, since)).or_else(|| {
+            let next = self.held.take().or_else(|| {
                 let bytes = self.client.poll(now)?;
                 Some((Frame::new(cob_id::sdo_request(self.node), &bytes).ok()?, now))
             });

@@ -294,7 +294,7 @@ fn a_bus_of_another_master_is_left_alone() {
 }
 
 #[test]
-fn who_does_not_want_to_go_on_is_let_go() {
+fn an_interrupted_start_ends_at_once() {
     let line = CanLine::new(Box::new(can()), NodeId::new(2).unwrap(), [0]);
     let catalogue = Catalogue::new(vec![Bus::Devicenet], &Mapping::embedded().unwrap());
     let opened = Session::open(Box::new(line), wait(BEGIN), (names(), 0), catalogue, || false);

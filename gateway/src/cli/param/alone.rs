@@ -55,7 +55,7 @@ impl Alone {
 
 impl Link for Alone {
     fn ask(&mut self, request: &str) -> Result<Reply, CliError> {
-        // A command is cancelled by who has started it.
+        // A command that was started is to be cancelled even now.
         if self.stop.load(Ordering::Relaxed) && !request.starts_with("command ") {
             return Err("interrupted".into());
         }

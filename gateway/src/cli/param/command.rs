@@ -91,16 +91,17 @@ pub fn run(arguments: &CommandArguments) -> Result<ExitCode, CliError> {
             format!("{}: {}, {:.1} s", heading(&report), report.state.name(), begun.elapsed().as_secs_f64())
         });
         sleep(INTERVAL);
-        match drive.command(&number, Act::Progress)? {
-            Found::Report(now) => {
+        let unknown = match drive.command(&number, Act::Progress) {
+            Ok(Found::Report(now)) => {
                 let CommandReport { name, recommission, .. } = report;
                 report = CommandReport { name, recommission, ..*now };
+                continue;
             }
-            Found::Refused(refused) => {
-                progress.clear();
-                return Err(format!("started, and how far it is is not known: {refused}").into());
-            }
-        }
+            Ok(Found::Refused(refused)) => refused.text,
+            Err(error) => error.to_string(),
+        };
+        progress.clear();
+        return Err(format!("{number} is started, and its progress is not known: {unknown}").into());
     };
     progress.clear();
     end(&mut drive, &number, &report, begun, late.as_deref(), arguments.json)
@@ -117,10 +118,11 @@ fn end(
 ) -> Result<ExitCode, CliError> {
     // An object has no state that could be cancelled.
     let kept = match Id::parse(number) {
-        Some(Id::Idn(_)) => match drive.command(number, Act::Cancel)? {
-            Found::Report(after) if after.state == State::NotSet => None,
-            Found::Report(after) => Some(format!("the drive answers that it is {}", after.state.name())),
-            Found::Refused(refused) => Some(refused.text),
+        Some(Id::Idn(_)) => match drive.command(number, Act::Cancel) {
+            Ok(Found::Report(after)) if after.state == State::NotSet => None,
+            Ok(Found::Report(after)) => Some(format!("the drive answers that it is {}", after.state.name())),
+            Ok(Found::Refused(refused)) => Some(refused.text),
+            Err(error) => Some(error.to_string()),
         },
         _ => None,
     };
@@ -147,7 +149,7 @@ fn end(
         }
     };
     if let Some(kept) = kept {
-        eprintln!("{number} is still set in the drive: {kept}");
+        eprintln!("{number} may still be set in the drive: {kept}");
     }
     Ok(code)
 }

@@ -20,7 +20,7 @@ use crate::parameter::id::Id;
 /// How long a drive may take for a request: several accesses, each of which the gateway gives up after a second or so.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Who answers requests.
+/// Answers requests: a gateway, or the drive itself.
 pub trait Link {
     /// The reply to a request.
     fn ask(&mut self, request: &str) -> Result<Reply, CliError>;

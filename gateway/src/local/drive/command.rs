@@ -301,7 +301,7 @@ impl CommandJob {
                 format!("{id}: it is not known whether the drive has cancelled it: {failure}")
             }
             (Asked::Status, Act::Start) => {
-                format!("{id}: started, and how far it is is not known: {failure}")
+                format!("{id}: started, and its progress is not known: {failure}")
             }
             _ => format!("{id}: {failure}"),
         };
