@@ -51,6 +51,8 @@ pub enum Backing {
     Signal {
         /// The signal.
         signal: Signal,
+        /// The parameter of the drive that is read while the signal has no value.
+        otherwise: Option<Parameter>,
         /// From the generic unit.
         from_generic: Conversion,
     },
@@ -182,9 +184,9 @@ fn entry(
         Served::Stored => Backing::Stored,
         Served::Constant(value) => Backing::Constant(value),
         Served::Mechanics(fact) => Backing::Mechanics(fact),
-        Served::Signal { signal, unit } => {
+        Served::Signal { signal, otherwise, unit } => {
             let to_generic = scaling.convert(unit, turns)?;
-            Backing::Signal { signal, from_generic: Conversion::new(to_generic.inverse()?) }
+            Backing::Signal { signal, otherwise, from_generic: Conversion::new(to_generic.inverse()?) }
         }
         Served::Parameter { parameter, unit, missing, range } => {
             let to_generic = scaling.convert(unit, turns)?;
@@ -323,10 +325,10 @@ impl AttributeEntry {
         out: &mut [u8; 8],
     ) -> Result<usize, ValueError> {
         let seen = match &self.backing {
-            Backing::Signal { signal: Signal::PositionActual, from_generic } => {
+            Backing::Signal { signal: Signal::PositionActual, from_generic, .. } => {
                 view.measured(from_generic.convert(generic).value)
             }
-            Backing::Signal { signal: Signal::PositionCommand, from_generic } => {
+            Backing::Signal { signal: Signal::PositionCommand, from_generic, .. } => {
                 view.commanded(from_generic.convert(generic).value)
             }
             _ => return self.from_generic(generic, out).map(|(len, _)| len),

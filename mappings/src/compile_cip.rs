@@ -336,7 +336,7 @@ impl CipProgram {
             events: EventProgram::compile(&tables.events, scaling)?,
         };
         for row in tables.attributes.iter().filter(|row| row.attribute.access == Access::SetCyclic) {
-            if let (Served::Signal { signal, unit }, turns) = behind(tables, row, scaling) {
+            if let (Served::Signal { signal, unit, .. }, turns) = behind(tables, row, scaling) {
                 let to_generic = Conversion::new(scaling.convert(*unit, turns)?);
                 program.trims.try_push((row.attribute.id, *signal, to_generic)).ok()?;
             }

@@ -387,6 +387,12 @@ impl DriveProgram {
         !self.parameters.is_empty()
     }
 
+    /// Revolutions of the motor in one axis unit, in 1e-9: by gear and feed. `None` where nobody knows them.
+    #[must_use]
+    pub fn motor_turns_per_unit(&self) -> Option<i64> {
+        self.mechanics.and_then(|mechanics| mechanics.motor_turns_per_unit())
+    }
+
     /// The values to the drive, each with what carries it.
     pub fn command_fields(&self) -> impl Iterator<Item = (&Field, Item)> + '_ {
         // Two signals that stand in one place have one item.

@@ -257,7 +257,8 @@ impl Mapping {
         })?;
         expect(span.clone(), "value of the bytes", &number(*example.value.get_ref()), &float)?;
         let generic = *example.generic.get_ref();
-        if row.parameter.is_some() {
+        // Of a parameter that is read while a signal has no value, the conversion is the signal's.
+        if row.parameter.is_some() && row.signal.is_none() {
             expect(example.generic.span(), "generic value", &Ok(generic), &entry.to_generic(&bytes))?;
         }
         let mut out = [0; 8];

@@ -120,7 +120,9 @@ pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,
     MissingValue,
 };
-pub use computed::{Computation, Known, NoValue, Operand, Operation, READS_MAX, ROWS_MAX, Read, Row};
+pub use computed::{
+    Computation, Control, Fact, Known, Limit, NoValue, Operand, Operation, READS_MAX, ROWS_MAX, Read, Row,
+};
 pub use device_link::Told;
 pub use dictionary::{
     Access, Cia402Access, Cia402Category, Cia402Class, Cia402Code, Cia402CodeSet, Cia402Dictionary,

@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use profile_generic::ratio::Ratio;
+use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::scaling::UnitKind;
 
 use super::attributes::Number;
@@ -91,6 +91,17 @@ impl Mechanics {
         }
     }
 
+    /// Revolutions of the motor in one axis unit (a turn or a millimetre of the load), in 1e-9; `None` where nobody knows the travel.
+    #[must_use]
+    pub fn motor_turns_per_unit(&self) -> Option<i64> {
+        let gear = self.gear.unwrap_or(Ratio::ONE);
+        let turns = match self.kind {
+            UnitKind::Rotary => gear,
+            UnitKind::Linear => gear.then(self.travel?.inverse()?)?,
+        };
+        turns.apply(1_000_000_000, Rounding::Nearest).ok()
+    }
+
     /// Whether the load turns as the motor does.
     fn is_direct(&self) -> bool {
         self.gear.is_none_or(|gear| gear.num() == gear.den())
@@ -137,6 +148,15 @@ mod tests {
         assert!(axis.agrees(MechanicalFact::Diameter, Number::Real(3.978_874)));
         assert!(!axis.agrees(MechanicalFact::Diameter, Number::Real(3.978_9)));
         assert!(!axis.agrees(MechanicalFact::Diameter, Number::Integer(4)));
+    }
+
+    #[test]
+    fn a_unit_of_the_load_is_turns_of_the_motor_by_gear_and_travel() {
+        let turns = |kind, gear, travel| Mechanics { kind, gear, travel }.motor_turns_per_unit();
+        assert_eq!(turns(UnitKind::Rotary, None, None), Some(1_000_000_000));
+        assert_eq!(turns(UnitKind::Rotary, Ratio::new(10, 3), None), Some(3_333_333_333));
+        assert_eq!(turns(UnitKind::Linear, Ratio::new(2, 1), Ratio::new(5, 1)), Some(400_000_000));
+        assert_eq!(turns(UnitKind::Linear, None, None), None);
     }
 
     #[test]

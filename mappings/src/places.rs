@@ -21,9 +21,10 @@ impl Mapping {
     /// Where a parameter of the generic model is.
     #[must_use]
     pub fn places_of_parameter(&self, parameter: Parameter) -> Places {
-        let cip = self.attributes_served(
-            |served| matches!(served, Served::Parameter { parameter: known, .. } if *known == parameter),
-        );
+        let cip = self.attributes_served(|served| {
+            matches!(served, Served::Parameter { parameter: known, .. } if *known == parameter)
+                || matches!(served, Served::Signal { otherwise: Some(known), .. } if *known == parameter)
+        });
         let sercos = self.sercos.parameters.iter().filter(|rule| rule.parameter == parameter);
         let cia402 = self.cia402.parameters.iter().filter(|rule| rule.parameter == parameter);
         Places {

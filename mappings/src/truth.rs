@@ -99,9 +99,18 @@ impl Mapping {
                 Some(value) => (Truth::Compared, format!("{value} by the scaling of the drive")),
                 None => (Truth::Absent, "the drive does not show it".to_owned()),
             },
+            Backing::Signal { signal, otherwise: Some(parameter), .. } if !drive.tells(signal) => {
+                self.truth_of(parameter, Missing::Absent, is_set, drive)
+            }
             Backing::Signal { signal, .. } => (Truth::Live, signal.to_string()),
             Backing::Parameter { parameter, missing, .. } => self.truth_of(parameter, missing, is_set, drive),
         }
+    }
+
+    /// How the value of a parameter is computed, in words.
+    fn formula(&self, name: &str) -> String {
+        let row = self.tables().generic.rows.computed.iter().find(|row| row.parameter.get_ref() == name);
+        row.map_or_else(|| name.to_owned(), |row| format!("{name}: {}", row.words()))
     }
 
     fn truth_of(
@@ -112,8 +121,13 @@ impl Mapping {
         drive: &DriveProgram,
     ) -> (Truth, String) {
         let name = self.parameter_name(parameter);
-        if self.dictionaries.generic.computation(parameter).is_some() {
-            return (Truth::Computed, name.to_string());
+        if let Some(computation) = self.dictionaries.generic.computation(parameter)
+            && drive.parameter(parameter).is_none()
+        {
+            return match computation.is_possible(drive) {
+                true => (Truth::Computed, self.formula(&name.to_string())),
+                false => (Truth::Absent, format!("the drive lacks what {name} is computed from")),
+            };
         }
         match (drive.parameter(parameter), missing) {
             (Some(held), _) if is_set && held.to_drive.is_none() => {

@@ -1,8 +1,8 @@
 //! Accesses to one parameter of a drive in generic units, from the request to the result.
 //!
-//! A parameter that the drive has takes one access to the drive. One that is computed takes a read for each operand that counts,
-//! one after the other, and a write for the operand that is written when it is set. Nothing is kept: every value is the drive's at
-//! that moment.
+//! A parameter that the drive has takes one access to the drive. One that is computed takes a read for each operand that counts and
+//! that is in no telegram, one after the other, and a write for the operand that is written when it is set. Signals are taken in the
+//! cycle in which the last operand is known. Nothing is kept: every value is the drive's at that moment.
 
 use arrayvec::ArrayVec;
 use profile_generic::parameter::{Access as When, Parameter};
@@ -11,7 +11,7 @@ use profile_generic::state::Report;
 use super::access::{Access, AccessFailure, Refusal};
 use super::axis::AxisChannel;
 use super::bus::Answer;
-use crate::mapping::{Computation, Known, Mapping, NoValue, READS_MAX};
+use crate::mapping::{Computation, DriveProgram, Fact, Known, Mapping, NoValue, READS_MAX};
 
 /// Accesses under way at the same time, of one axis by a controller or of all axes by another north side.
 pub const JOBS_MAX: usize = 4;
@@ -87,7 +87,8 @@ pub struct ParameterJob {
     parameter: Parameter,
     /// What is written; `None` reads.
     wanted: Option<i64>,
-    known: Known,
+    /// What the drive has answered, in the order of the reads.
+    answers: [Option<i64>; READS_MAX],
     next: Asked,
     asked: Asked,
     result: Option<Result<i64, ParameterFailure>>,
@@ -97,8 +98,8 @@ impl ParameterJob {
     /// Reads a parameter, or writes a value to it.
     #[must_use]
     pub const fn new(parameter: Parameter, wanted: Option<i64>) -> Self {
-        let (known, next, asked) = ([None; READS_MAX], Asked::Nothing, Asked::Nothing);
-        Self { parameter, wanted, known, next, asked, result: None }
+        let (answers, next, asked) = ([None; READS_MAX], Asked::Nothing, Asked::Nothing);
+        Self { parameter, wanted, answers, next, asked, result: None }
     }
 
     /// What comes next.
@@ -115,7 +116,10 @@ impl ParameterJob {
             self.fail(failure);
             return Next::Done(Err(failure));
         }
-        let request = match mapping.dictionaries.generic.computation(self.parameter) {
+        // What the drive itself has goes first.
+        let is_computed = axis.south().is_none_or(|program| !has(program, self.parameter));
+        let computation = mapping.dictionaries.generic.computation(self.parameter);
+        let request = match computation.filter(|_| is_computed) {
             Some(computation) => self.compute(computation, axis),
             None => match self.wanted {
                 Some(wanted) => self.write(self.parameter, wanted, axis),
@@ -158,25 +162,46 @@ impl ParameterJob {
         computation: &Computation,
         axis: &AxisChannel,
     ) -> Result<Option<Access>, Result<i64, ParameterFailure>> {
+        let program = axis.south().ok_or(Err(ParameterFailure::Unanswered))?;
+        if self.answers.iter().all(Option::is_none) && !computation.is_possible(program) {
+            return Err(Err(ParameterFailure::Absent));
+        }
+        let known = self.known(computation, program, axis);
         let (missing, is_write) = match self.wanted {
-            None => match computation.value(&self.known) {
+            None => match computation.value(&known) {
                 Ok(value) => return Err(Ok(value)),
                 Err(missing) => (missing, false),
             },
-            Some(wanted) => match computation.solve(wanted, &self.known) {
+            Some(wanted) => match computation.solve(wanted, &known) {
                 Ok((parameter, value)) => return self.write(parameter, value, axis),
                 Err(missing) => (missing, true),
             },
         };
         match missing {
             NoValue::Needs(place) => {
-                let read = computation.reads.get(place).ok_or(Err(ParameterFailure::Absent))?;
-                self.read(read.parameter, Asked::Operand(place, read.parameter), axis)
+                let read = computation.reads.get(place).and_then(|read| read.parameter);
+                let parameter = read.ok_or(Err(ParameterFailure::Absent))?;
+                self.read(parameter, Asked::Operand(place, parameter), axis)
             }
+            // Another operating mode has what this one lacks.
+            NoValue::Absent(_) => Err(Err(ParameterFailure::NoValue(NoValue::Mode))),
             NoValue::ReadOnly => Err(Err(ParameterFailure::ReadOnly)),
             NoValue::Beyond | NoValue::Divisor if is_write => Err(Err(ParameterFailure::Value)),
             other => Err(Err(ParameterFailure::NoValue(other))),
         }
+    }
+
+    /// What is known of the operands now: what the drive has answered, and the signals of this cycle.
+    fn known(&self, computation: &Computation, program: &DriveProgram, axis: &AxisChannel) -> Known {
+        let mut known = Known { control: axis.control(), ..Known::default() };
+        let places = known.facts.iter_mut().zip(&self.answers).zip(&computation.reads);
+        for ((fact, answer), read) in places {
+            *fact = match (read.fact(program, |signal| axis.signal(signal)), answer) {
+                (Fact::Unknown, Some(value)) => Fact::Value(*value),
+                (fact, _) => fact,
+            };
+        }
+        known
     }
 
     fn read(
@@ -240,13 +265,18 @@ impl ParameterJob {
         };
         match asked {
             Asked::Operand(place, _) => {
-                if let Some(known) = self.known.get_mut(place) {
+                if let Some(known) = self.answers.get_mut(place) {
                     *known = Some(value);
                 }
             }
             _ => self.result = Some(Ok(value)),
         }
     }
+}
+
+/// Whether the drive has a parameter that can be read.
+fn has(program: &DriveProgram, parameter: Parameter) -> bool {
+    program.parameter(parameter).is_some_and(|held| held.from_drive.is_some())
 }
 
 /// Accesses under way, each with what it is for.

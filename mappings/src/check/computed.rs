@@ -3,10 +3,12 @@
 //! The ranges of the operands are those of their parameters, or else what the drive's bytes can hold. They are carried through the
 //! rows exactly: an interval ends where one of its operands ends, as sums, products and quotients rise or fall all the way.
 
+use profile_generic::image::Signal;
+use profile_generic::parameter::Parameter;
 use profile_generic::ratio::quotient;
 
 use crate::attributes::Backing;
-use crate::computed::{Computation, Operand, Operation, Row};
+use crate::computed::{Computation, Limit, Operand, Operation, Read, Row};
 use crate::finding::registry::{self as code, Code};
 use crate::finding::{Findings, Problem};
 use crate::format::{ComputedRow, Name};
@@ -14,6 +16,9 @@ use crate::{CipScaling, DriveProgram, Mapping};
 
 /// Least and greatest value.
 type Interval = (i128, i128);
+
+/// What a signal can be that is in no telegram: as many whole numbers as a floating point number holds.
+const SIGNAL: Interval = (-(1 << 53), 1 << 53);
 
 /// Why a row has no interval within its range.
 enum Unfit {
@@ -23,6 +28,8 @@ enum Unfit {
     Way,
     /// The result is in this interval, which is beyond its range.
     Result(Interval),
+    /// The drive lacks an operand.
+    Missing,
 }
 
 /// The rows of computed values, with what they say.
@@ -40,8 +47,10 @@ pub(super) fn bindings(mapping: &Mapping, findings: &mut Findings) {
     let of_families = mapping.families().iter().map(|family| &family.mapping);
     let cia402: Vec<_> = of_families.chain([mapping]).map(|known| &known.tables().generic_cia402).collect();
     let generic = &mapping.dictionaries.generic;
+    // One of the catalogue is computed for the drives that lack it.
     let is_computed = |name: &Name| {
-        generic.parameter(name.get_ref()).is_some_and(|row| generic.computation(row.parameter).is_some())
+        let known = generic.parameter(name.get_ref()).filter(|row| row.parameter.is_of_vendor());
+        known.is_some_and(|row| generic.computation(row.parameter).is_some())
     };
     let south = "expected no row for a drive: the value is computed";
     for row in tables.generic_sercos.rows.parameter.iter().filter(|row| is_computed(&row.parameter)) {
@@ -55,8 +64,13 @@ pub(super) fn bindings(mapping: &Mapping, findings: &mut Findings) {
         }
     }
     for (row, computation) in rows(mapping) {
-        for read in &computation.reads {
-            let name = mapping.parameter_name(read.parameter);
+        let is_drives = |read: &&Read| read.signal.is_none() && !read.is_zero_if_missing;
+        let is_computed = |parameter: &Parameter| {
+            *parameter == Parameter::MOTOR_TURNS_PER_UNIT || generic.computation(*parameter).is_some()
+        };
+        let reads = computation.reads.iter().filter(is_drives).filter_map(|read| read.parameter);
+        for parameter in reads.filter(|parameter| !is_computed(parameter)) {
+            let name = mapping.parameter_name(parameter);
             let is = |known: &Name| *known.get_ref() == name;
             let has = tables.generic_sercos.rows.parameter.iter().any(|row| is(&row.parameter))
                 || cia402.iter().any(|file| file.rows.parameter.iter().any(|row| is(&row.parameter)));
@@ -79,8 +93,10 @@ pub(super) fn ranges(
     findings: &mut Findings,
 ) {
     for (row, computation) in rows(mapping) {
-        let Some(reads) = reads(program, computation) else { continue };
-        let Some(parameter) = mapping.dictionaries.generic.parameter(row.parameter.get_ref()) else {
+        let reads: Vec<_> = computation.reads.iter().map(|read| interval(program, read)).collect();
+        // What a drive's bytes can hold says little of the catalogue's: a result that does not fit is refused when it is there.
+        let parameter = mapping.dictionaries.generic.parameter(row.parameter.get_ref());
+        let Some(parameter) = parameter.filter(|parameter| parameter.parameter.is_of_vendor()) else {
             continue;
         };
         let unit = parameter.quantity.unit();
@@ -108,6 +124,7 @@ pub(super) fn ranges(
                 };
                 format!("{low} to {high} {unit} with drives of {drives} do not fit {held}")
             }
+            (Some(Unfit::Missing), _) => continue,
             (None, Some(result)) if results.len() == computation.rows.len() => {
                 match beyond_attribute(mapping, scaling, parameter.parameter.0, *result) {
                     Some(kind) if parameter.range.is_none() => {
@@ -136,22 +153,33 @@ fn push(mapping: &Mapping, code: Code, name: &Name, message: String, findings: &
     }
 }
 
-/// What each operand of the drive can be; `None` where the drive lacks one.
-fn reads(program: &DriveProgram, computation: &Computation) -> Option<Vec<Interval>> {
-    let interval = |read: &crate::computed::Read| {
-        let entry = program.parameter(read.parameter)?;
-        let (low, high) = match read.range {
-            Some(range) => range,
-            None => {
-                let (least, most) = entry.width.range();
-                let from_drive = entry.from_drive?;
-                let (one, other) = (from_drive.convert(least).value, from_drive.convert(most).value);
-                (one.min(other), one.max(other))
-            }
-        };
-        Some((i128::from(low), i128::from(high)))
-    };
-    computation.reads.iter().map(interval).collect()
+/// What an operand can be that is not computed; `None` where the drive lacks it.
+fn interval(program: &DriveProgram, read: &Read) -> Option<Interval> {
+    if let Some((low, high)) = read.range {
+        let turns = read.parameter == Some(Parameter::MOTOR_TURNS_PER_UNIT);
+        let has = turns || program.parameter(read.parameter?).is_some();
+        return has.then_some((i128::from(low), i128::from(high)));
+    }
+    let signal = read.signal.and_then(|signal| of_signal(program, signal));
+    let held = read.parameter.and_then(|parameter| {
+        let entry = program.parameter(parameter)?;
+        let (least, most) = entry.width.range();
+        let from_drive = entry.from_drive?;
+        let (one, other) = (from_drive.convert(least).value, from_drive.convert(most).value);
+        Some((i128::from(one.min(other)), i128::from(one.max(other))))
+    });
+    let zero = Some((0, 0)).filter(|_| read.is_zero_if_missing);
+    [signal, held, zero].into_iter().flatten().reduce(joined)
+}
+
+/// What a signal can be; `None` of one that the drive does not send.
+fn of_signal(program: &DriveProgram, signal: Signal) -> Option<Interval> {
+    (signal.is_command() || program.tells(signal)).then_some(SIGNAL)
+}
+
+/// All that is in one of them or between them.
+fn joined((low, high): Interval, (least, most): Interval) -> Interval {
+    (low.min(least), high.max(most))
 }
 
 /// The type of the attribute that does not hold both ends.
@@ -173,11 +201,16 @@ fn beyond_attribute(
 }
 
 /// The interval of a row, by those of what it needs.
-fn result(row: &Row, reads: &[Interval], results: &[Interval]) -> Result<Interval, Unfit> {
+fn result(row: &Row, reads: &[Option<Interval>], results: &[Interval]) -> Result<Interval, Unfit> {
     let of = |operand: &Operand| match *operand {
         Operand::Constant(value) => Ok((i128::from(value), i128::from(value))),
-        Operand::Read(at) => reads.get(at).copied().ok_or(Unfit::Way),
-        Operand::Row(at) => results.get(at).copied().ok_or(Unfit::Way),
+        Operand::Read(at) => reads.get(at).copied().flatten().ok_or(Unfit::Missing),
+        Operand::Row(at) => results.get(at).copied().ok_or(Unfit::Missing),
+        Operand::ReadOrRow(read, at) => {
+            let read = reads.get(read).copied().flatten();
+            let both = read.into_iter().chain(results.get(at).copied()).reduce(joined);
+            both.ok_or(Unfit::Missing)
+        }
     };
     let all = |operands: &[Operand]| operands.iter().map(of).collect::<Result<Vec<_>, _>>();
     let (tops, bottoms) = match &row.operation {
@@ -209,6 +242,11 @@ fn result(row: &Row, reads: &[Interval], results: &[Interval]) -> Result<Interva
             }
             (vec![low, high], vec![least, most])
         }
+        // At most what is limited; the ends are not looked at.
+        Operation::Limit(Limit { value, .. }) => {
+            let (low, high) = of(value)?;
+            (vec![low, high], vec![1])
+        }
         Operation::Selection(_, choices) => {
             let taken: Vec<Operand> = choices.iter().map(|(_, taken)| *taken).collect();
             (all(&taken)?.into_iter().flat_map(|(low, high)| [low, high]).collect(), vec![1])
@@ -233,7 +271,9 @@ fn result(row: &Row, reads: &[Interval], results: &[Interval]) -> Result<Interva
     if (low < least || high > most) && !row.saturates {
         return Err(Unfit::Result((low, high)));
     }
-    Ok((low.clamp(least, most), high.clamp(least, most)))
+    let (low, high) = (low.clamp(least, most), high.clamp(least, most));
+    // In the other modes it is 0.
+    Ok(if row.modes.is_empty() { (low, high) } else { joined((low, high), (0, 0)) })
 }
 
 fn added(one: i128, other: i128) -> Result<i128, Unfit> {

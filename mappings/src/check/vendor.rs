@@ -33,7 +33,7 @@ pub(super) fn bindings(mapping: &Mapping, findings: &mut Findings) {
         let is_computed = generic.computation(row.parameter).is_some();
         let needs = |computation: &Computation| {
             let own = computation.rows.last().is_some_and(|last| last.parameter == row.parameter);
-            let reads = computation.reads.iter().any(|read| read.parameter == row.parameter);
+            let reads = computation.reads.iter().any(|read| read.parameter == Some(row.parameter));
             !own && (reads || computation.rows.iter().any(|known| known.parameter == row.parameter))
         };
         let is_operand = generic.computations().iter().any(needs);

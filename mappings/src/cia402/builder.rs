@@ -9,9 +9,9 @@ use profile_generic::time::DurationNs;
 
 use super::captures::{CaptureRule, LatchRule};
 use super::{
-    ActionRule, Base, Cia402Tables, DriveDefaults, DriveMode, Drives, Handshake, Method, ModeRule, Object,
-    ParameterAt, ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule, Tells,
-    VOLTAGE_BIT, Value, Words,
+    ActionRule, Base, Cia402Tables, DriveDefaults, DriveMode, Drives, Handshake, Inversion, Method, ModeRule,
+    Object, ParameterAt, ProcedureRule, ReportRule, ScalingRule, SignalRule, StatusRule, StepKind, StepRule,
+    Tells, VOLTAGE_BIT, Value, Words,
 };
 use crate::dictionary::{Cia402Access, Cia402CodeSet, Cia402Sub, Dictionaries, quantity};
 use crate::drive_program::FaultRow;
@@ -522,6 +522,10 @@ impl<'a> Builder<'a> {
         let value = self.value("object", &row.object);
         let inverted = self.like("inverted", row.inverted.as_ref(), value.as_ref());
         let common = self.like("common", row.common.as_ref(), value.as_ref());
+        let polarity = row.polarity.as_ref().and_then(|name| match name.get_ref().as_str() {
+            "none" => Some(Inversion::Never),
+            _ => self.polarity("polarity", name).map(Inversion::Bit),
+        });
         let (Some(rule), Some((value, entry))) = (rule, value) else { return };
         let quantity = rule.quantity;
         if !self.measures(&value, quantity) {
@@ -531,7 +535,7 @@ impl<'a> Builder<'a> {
         self.writable(entry, rule.to_drive, &row.direction, value.object);
         let known = self.tables.parameters.iter().any(|known| known.parameter == rule.parameter);
         once(&mut self.resolver, known, "parameter", &row.parameter);
-        self.tables.parameters.push(rule.at(ParameterAt { value, inverted, common }));
+        self.tables.parameters.push(rule.at(ParameterAt { value, inverted, common, polarity }));
     }
 
     /// An object that takes the place of another one, whose unit it has.

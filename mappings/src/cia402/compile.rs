@@ -12,8 +12,8 @@ use profile_generic::time::DurationNs;
 
 use super::facts::ObjectFacts;
 use super::{
-    Cia402Tables, DriveMode, FULL_RANGE, ModeRule, Object, ParameterAt, ParameterRule, ProcedureRule,
-    SignalRule, Value,
+    Cia402Tables, DriveMode, FULL_RANGE, Inversion, ModeRule, Object, ParameterAt, ParameterRule,
+    ProcedureRule, SignalRule, Value,
 };
 use crate::capture_program::{CaptureMode, Place};
 use crate::dictionary::Cia402Dictionary;
@@ -622,6 +622,12 @@ impl Cia402Tables {
         };
         let overflow = || Cia402Error::Overflow(value.object);
         let ratio = rule.factor.inverse().and_then(|factor| count.then(factor)).ok_or_else(overflow)?;
+        let turned = rule.at.polarity.is_some_and(|polarity| {
+            let own = matches!(polarity, Inversion::Bit(bit) if self.inverts(bit, facts));
+            own != self.inverts_positions(facts)
+        });
+        let opposite = ratio.num().checked_neg().and_then(|num| Ratio::new(num, ratio.den()));
+        let ratio = if turned { opposite.ok_or_else(overflow)? } else { ratio };
         let (min, max) = value.width.range();
         Ok(Some(ParameterEntry {
             parameter: rule.parameter,
@@ -636,7 +642,7 @@ impl Cia402Tables {
     pub(crate) fn plain_rule(&self, value: Value) -> ParameterRule {
         let scaling = self.scalings.iter().find(|rule| rule.unit == value.unit);
         let quantity = scaling.map_or(Quantity::None, |rule| rule.quantity);
-        ParameterRule::plain(quantity, ParameterAt { value, inverted: None, common: None })
+        ParameterRule::plain(quantity, ParameterAt { value, inverted: None, common: None, polarity: None })
     }
 }
 

@@ -184,6 +184,17 @@ pub(crate) struct ParameterAt {
     pub inverted: Option<Value>,
     /// What limits both directions in a drive without it.
     pub common: Option<Value>,
+    /// By what the drive inverts the value, where that is not what inverts its positions.
+    pub polarity: Option<Inversion>,
+}
+
+/// What inverts a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Inversion {
+    /// Nothing.
+    Never,
+    /// A bit of the polarity.
+    Bit(u32),
 }
 
 pub(crate) type ParameterRule = super::drive_rows::ParameterRule<ParameterAt>;

@@ -5,7 +5,7 @@ use profile_generic::capture::CaptureStatus;
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
-use profile_generic::parameter::{Access as Write, ParameterType};
+use profile_generic::parameter::{Access as Write, Parameter, ParameterType};
 use profile_generic::quantity::Quantity;
 use profile_generic::sequence::{StopMethod, StopPlan};
 use profile_generic::state::{DriveState, Request};
@@ -671,7 +671,9 @@ impl Builder<'_> {
         let Some(attribute) = found else { return };
         let served = match (&row.parameter, &row.signal, &row.served_by) {
             (Some(name), None, None) => self.parameter(row, attribute, name),
-            (None, Some(name), None) => self.signal_attribute(attribute, name),
+            (parameter, Some(name), None) => {
+                self.signal_attribute(row, attribute, (name, parameter.as_ref()))
+            }
             (None, None, Some(name)) if name.get_ref() == "mechanics" => self.mechanical(attribute, name),
             (None, None, Some(name)) => {
                 let value = self.constant(row, attribute, name);
@@ -684,7 +686,7 @@ impl Builder<'_> {
                 self.resolver.word("served_by", name, &words)
             }
             _ => {
-                let message = "expected one of parameter, signal and served_by";
+                let message = "expected parameter, signal, both of them, or served_by";
                 self.resolver.error(code::CONTRADICTION, row.attribute.span(), "attribute", message);
                 None
             }
@@ -827,8 +829,18 @@ impl Builder<'_> {
         }
     }
 
-    fn signal_attribute(&mut self, attribute: &CipAttribute, name: &Name) -> Option<Served> {
+    /// An attribute that shows a signal, and a parameter while the signal has no value.
+    fn signal_attribute(
+        &mut self,
+        row: &CipAttributeRow,
+        attribute: &CipAttribute,
+        (name, parameter): (&Name, Option<&Name>),
+    ) -> Option<Served> {
         let signal = signal(&mut self.resolver, "signal", name)?;
+        let otherwise = match parameter {
+            None => None,
+            Some(parameter) => Some(self.otherwise(row, attribute, (signal, parameter))?),
+        };
         if attribute.access == Access::SetCyclic && !Signal::OFFSETS.contains(&signal) {
             let message = format!("expected an offset, as {} is added to a set-point", attribute.name);
             self.resolver.error(code::DIRECTION, name.span(), "signal", message);
@@ -843,7 +855,31 @@ impl Builder<'_> {
             self.resolver.error(code::UNIT, name.span(), "signal", message);
             return None;
         }
-        Some(Served::Signal { signal, unit })
+        Some(Served::Signal { signal, otherwise, unit })
+    }
+
+    /// The parameter that is read while a signal has no value: it measures the same, and is only read.
+    fn otherwise(
+        &mut self,
+        row: &CipAttributeRow,
+        attribute: &CipAttribute,
+        (signal, name): (Signal, &Name),
+    ) -> Option<Parameter> {
+        let Served::Parameter { parameter, .. } = self.parameter(row, attribute, name)? else { return None };
+        let known = self.dictionaries.generic.by_number(parameter);
+        if known.is_some_and(|known| known.quantity != signal.quantity()) {
+            let message =
+                format!("expected a parameter that measures {}, as {signal} does", signal.quantity());
+            self.resolver.error(code::UNIT, name.span(), "parameter", message);
+            return None;
+        }
+        if attribute.access != Access::Get || row.missing.is_some() {
+            let message =
+                "expected an attribute that is only read, and no `missing`: its signal is the drive's";
+            self.resolver.error(code::CONTRADICTION, name.span(), "parameter", message);
+            return None;
+        }
+        Some(parameter)
     }
 
     fn finish(mut self, file: &Parsed<CipGenericFile>) -> CipTables {

@@ -161,6 +161,8 @@ pub enum Served {
     Signal {
         /// The signal.
         signal: Signal,
+        /// The parameter of the drive that is read while the signal has no value.
+        otherwise: Option<Parameter>,
         /// Unit of the attribute.
         unit: CipUnit,
     },

@@ -1,13 +1,16 @@
 //! Constants, and parameters whose values are computed from others: from rows to computations.
 
-use profile_generic::parameter::{Access, ParameterType};
+use profile_generic::image::Signal;
+use profile_generic::mode::OperatingMode;
+use profile_generic::parameter::{Access, Parameter, ParameterType};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::{Ratio, Rounding};
 
 use super::{GenericDictionary, GenericParameter, quantity};
-use crate::computed::{Computation, Operand, Operation, READS_MAX, ROWS_MAX, Read, Row};
+use crate::computed::{Computation, Limit, Operand, Operation, READS_MAX, ROWS_MAX, Read, Row};
 use crate::finding::registry as code;
 use crate::format::{ComputedRow, ConstantRow, GenericFile, Name};
+use crate::generic_names::{operating_mode, signal};
 use crate::resolver::Resolver;
 
 /// The most operands of a sum, and the most choices of a selection.
@@ -15,6 +18,12 @@ const OPERANDS_MAX: usize = 32;
 
 /// The most factors of a product: that many of 31 bits fit the arithmetic.
 const FACTORS_MAX: usize = 4;
+
+/// Revolutions of the motor in a unit of the axis, in 1e-9: up to a gear of 1000:1.
+const MOTOR_TURNS: (i64, i64) = (1, 1_000_000_000_000);
+
+/// Whether a value beyond an end of `limit` is held at it.
+pub(crate) const AT_LIMIT: [(&str, bool); 2] = [("hold", true), ("none", false)];
 
 /// A constant by name.
 #[derive(Debug, Clone)]
@@ -28,14 +37,18 @@ struct Constant {
 #[derive(Debug, Clone, Copy)]
 enum Named<'g> {
     Constant(Quantity, i64),
-    Parameter(&'g GenericParameter),
+    /// A parameter, and whether it is 0 in a drive without it.
+    Parameter(&'g GenericParameter, bool),
+    /// A signal, and the parameter of its name that is read while it has no value.
+    Signal(Signal, Option<Parameter>),
 }
 
 impl Named<'_> {
     fn quantity(&self) -> Quantity {
         match self {
             Self::Constant(quantity, _) => *quantity,
-            Self::Parameter(parameter) => parameter.quantity,
+            Self::Parameter(parameter, _) => parameter.quantity,
+            Self::Signal(signal, _) => signal.quantity(),
         }
     }
 }
@@ -47,6 +60,8 @@ enum Ways<'g> {
     Product(Vec<Named<'g>>),
     Ratio([Named<'g>; 2]),
     Selection(Named<'g>, Vec<(i64, Named<'g>)>),
+    /// What is limited; least, most, within; whether it is held.
+    Limit(Named<'g>, [Vec<Named<'g>>; 3], bool),
 }
 
 /// A row with its names looked up.
@@ -57,6 +72,7 @@ struct Looked<'g> {
     ways: Ways<'g>,
     factor: Ratio,
     rounding: Rounding,
+    modes: Vec<OperatingMode>,
 }
 
 /// Everything that is computed, by the numbers of the parameters.
@@ -68,8 +84,8 @@ pub(super) fn resolve(
     let constants = constants(resolver, &rows.constant, dictionary);
     let mut looked: Vec<Looked<'_>> = Vec::new();
     for row in &rows.computed {
-        let mut reader = RowReader { resolver, dictionary, constants: &constants };
-        let Some(found) = reader.row(row) else { continue };
+        let mut reader = RowReader { resolver, dictionary, constants: &constants, row };
+        let Some(found) = reader.read() else { continue };
         if looked.iter().any(|other| other.parameter.parameter == found.parameter.parameter) {
             resolver.error(code::TWICE, row.parameter.span(), "parameter", "the parameter is computed twice");
             continue;
@@ -120,15 +136,20 @@ struct RowReader<'r, 'f, 'g> {
     resolver: &'r mut Resolver<'f>,
     dictionary: &'g GenericDictionary,
     constants: &'g [Constant],
+    row: &'g ComputedRow,
 }
 
 impl<'g> RowReader<'_, '_, 'g> {
-    fn row(&mut self, row: &'g ComputedRow) -> Option<Looked<'g>> {
-        let dictionary = self.dictionary;
-        let what = "a [[generic.parameter]] with a number from 0x8000";
-        let find =
-            |text: &str| dictionary.parameter(text).filter(|parameter| parameter.parameter.is_of_vendor());
-        let own = dictionary.parameters().iter().filter(|parameter| parameter.parameter.is_of_vendor());
+    fn read(&mut self) -> Option<Looked<'g>> {
+        let (dictionary, row) = (self.dictionary, self.row);
+        let what =
+            "a [[generic.parameter]] with a number from 0x8000, or one of the catalogue that is only read";
+        // What a controller sets is kept somewhere: of the catalogue only what is read can be computed.
+        let can_be = |parameter: &&GenericParameter| {
+            parameter.parameter.is_of_vendor() || parameter.access == Access::Read
+        };
+        let find = |text: &str| dictionary.parameter(text).filter(can_be);
+        let own = dictionary.parameters().iter().filter(can_be);
         let own = own.map(|parameter| parameter.name.as_str());
         let parameter = self.resolver.name("parameter", &row.parameter, what, find, own);
         let ways = self.ways(row);
@@ -138,7 +159,10 @@ impl<'g> RowReader<'_, '_, 'g> {
         let rounding = row.rounding.as_ref();
         let rounding =
             rounding.map_or(Some(Rounding::Nearest), |name| self.resolver.word("rounding", name, &words));
-        let (parameter, ways) = (parameter?, ways?);
+        let modes: Vec<_> = row.modes.iter().map(|name| operating_mode(self.resolver, name)).collect();
+        let modes: Option<Vec<_>> = modes.into_iter().collect();
+        self.marked();
+        let (parameter, ways, modes) = (parameter?, ways?, modes?);
         let units = self.units(row, parameter, &ways);
         self.access(row, parameter);
         self.saturation(row, parameter);
@@ -148,7 +172,27 @@ impl<'g> RowReader<'_, '_, 'g> {
             let span = row.factor.as_ref().map_or(row.parameter.span(), |factor| factor.span());
             self.resolver.error(code::OUT_OF_RANGE, span, "factor", message);
         }
-        Some(Looked { row, parameter, ways, factor: factor?, rounding: rounding? })
+        Some(Looked { row, parameter, ways, factor: factor?, rounding: rounding?, modes })
+    }
+
+    /// What `signals` and `zero_if_missing` name are operands.
+    fn marked(&mut self) {
+        let row = self.row;
+        let is_operand =
+            |name: &Name| row.operands().chain(&row.by).any(|operand| operand.get_ref() == name.get_ref());
+        for (key, names) in [("signals", &row.signals), ("zero_if_missing", &row.zero_if_missing)] {
+            for name in names.iter().filter(|name| !is_operand(name)) {
+                self.contradiction(name, key, "expected one of the operands of the row");
+            }
+        }
+        let both = |name: &&Name| row.signals.iter().any(|signal| signal.get_ref() == name.get_ref());
+        for name in row.zero_if_missing.iter().filter(both) {
+            self.contradiction(
+                name,
+                "zero_if_missing",
+                "expected a parameter of the drive, this one is a signal",
+            );
+        }
     }
 
     fn contradiction(&mut self, name: &Name, key: &str, message: &str) {
@@ -157,10 +201,15 @@ impl<'g> RowReader<'_, '_, 'g> {
 
     /// The one operation of a row.
     fn ways(&mut self, row: &ComputedRow) -> Option<Ways<'g>> {
-        let given =
-            [!row.sum.is_empty(), !row.product.is_empty(), row.ratio.is_some(), !row.selection.is_empty()];
+        let given = [
+            !row.sum.is_empty(),
+            !row.product.is_empty(),
+            row.ratio.is_some(),
+            !row.selection.is_empty(),
+            row.limit.is_some(),
+        ];
         if given.iter().filter(|given| **given).count() != 1 {
-            let message = "expected one of sum, product, ratio and selection";
+            let message = "expected one of sum, product, ratio, selection and limit";
             self.contradiction(&row.parameter, "parameter", message);
             return None;
         }
@@ -170,10 +219,19 @@ impl<'g> RowReader<'_, '_, 'g> {
         if let Some(by) = row.by.as_ref().filter(|_| row.selection.is_empty()) {
             self.contradiction(by, "by", "expected a `selection`");
         }
+        let ends = [("least", &row.least), ("most", &row.most), ("within", &row.within)];
+        for (key, names) in ends {
+            if let Some(first) = names.first().filter(|_| row.limit.is_none()) {
+                self.contradiction(first, key, "expected a `limit`, which this is an end of");
+            }
+        }
+        let holds =
+            row.at_limit.as_ref().map_or(Some(true), |name| self.resolver.word("at_limit", name, &AT_LIMIT));
         let limits = [
             ("sum", row.sum.len() + row.less.len(), OPERANDS_MAX),
             ("product", row.product.len(), FACTORS_MAX),
             ("selection", row.selection.len(), OPERANDS_MAX),
+            ("limit", row.least.len() + row.most.len() + row.within.len(), OPERANDS_MAX),
         ];
         for (key, count, limit) in limits.into_iter().filter(|(_, count, limit)| count > limit) {
             let message = format!("expected at most {limit} operands, got {count}");
@@ -191,13 +249,25 @@ impl<'g> RowReader<'_, '_, 'g> {
             let (dividend, divisor) = (self.operand("ratio", dividend), self.operand("ratio", divisor));
             return Some(Ways::Ratio([dividend?, divisor?]));
         }
+        if let Some(limited) = &row.limit {
+            let value = self.operand("limit", limited);
+            let [least, most, within] = ends.map(|(key, names)| self.operands(key, names));
+            if row.least.is_empty() && row.most.is_empty() && row.within.is_empty() {
+                let message = "expected `least`, `most` or `within`, between which the value is";
+                self.resolver.error(code::MISSING_KEY, limited.span(), "limit", message);
+            }
+            return Some(Ways::Limit(value?, [least?, most?, within?], holds?));
+        }
         let Some(by) = &row.by else {
             let message = "expected `by`, the parameter whose value selects";
             self.resolver.error(code::MISSING_KEY, row.parameter.span(), "by", message);
             return None;
         };
         let selector = self.operand("by", by);
-        if let Some(selector) = selector.filter(|selector| selector.quantity() != Quantity::None) {
+        // 0 is 0 in every unit.
+        let by_zero = row.selection.iter().all(|choice| *choice.is.get_ref() == 0);
+        if let Some(selector) = selector.filter(|selector| selector.quantity() != Quantity::None && !by_zero)
+        {
             let message = format!("expected a bare number to select by, got a {}", selector.quantity());
             self.resolver.error(code::UNIT, by.span(), "by", message);
         }
@@ -223,15 +293,27 @@ impl<'g> RowReader<'_, '_, 'g> {
     }
 
     fn operand(&mut self, key: &str, name: &Name) -> Option<Named<'g>> {
-        let (dictionary, constants) = (self.dictionary, self.constants);
+        let (dictionary, constants, row) = (self.dictionary, self.constants, self.row);
+        let is_in = |names: &[Name]| names.iter().any(|known| known.get_ref() == name.get_ref());
+        if is_in(&row.signals) {
+            let signal = signal(self.resolver, key, name)?;
+            // An offset is what a controller adds; the parameter of that name is another thing.
+            let parameter = dictionary.parameter(signal.name()).filter(|parameter| {
+                parameter.kind == ParameterType::Integer
+                    && parameter.quantity == signal.quantity()
+                    && !Signal::OFFSETS.contains(&signal)
+            });
+            return Some(Named::Signal(signal, parameter.map(|parameter| parameter.parameter)));
+        }
         let find = |text: &str| {
             let constant = constants.iter().find(|constant| constant.name == text);
             let constant = constant.map(|constant| Named::Constant(constant.quantity, constant.value));
-            constant.or_else(|| dictionary.parameter(text).map(Named::Parameter))
+            let parameter = dictionary.parameter(text);
+            constant.or_else(|| parameter.map(|known| Named::Parameter(known, is_in(&row.zero_if_missing))))
         };
         let names = constants.iter().map(|constant| constant.name.as_str()).chain(dictionary.names());
         let found = self.resolver.name(key, name, "a parameter or a [[generic.constant]]", find, names)?;
-        if let Named::Parameter(parameter) = found
+        if let Named::Parameter(parameter, _) = found
             && parameter.kind != ParameterType::Integer
         {
             let message = format!("expected a whole number, {} is a {}", name.get_ref(), parameter.kind);
@@ -252,6 +334,11 @@ impl<'g> RowReader<'_, '_, 'g> {
             Ways::Selection(_, choices) => {
                 let names = row.selection.iter().map(|choice| &choice.take);
                 return self.same_unit(("take", wanted), names.zip(choices.iter().map(|(_, taken)| taken)));
+            }
+            Ways::Limit(value, ends, _) => {
+                let names = row.limit.iter().chain(&row.least).chain(&row.most).chain(&row.within);
+                let named = std::iter::once(value).chain(ends.iter().flatten());
+                return self.same_unit(("limit", wanted), names.zip(named));
             }
             Ways::Product(factors) => (factors.as_slice(), &[][..]),
             Ways::Ratio([dividend, divisor]) => {
@@ -330,10 +417,7 @@ impl<'g> RowReader<'_, '_, 'g> {
             return self.contradiction(writes, "writes", &message);
         }
         let is = |other: &&Name| other.get_ref() == writes.get_ref();
-        let taken = row.selection.iter().map(|choice| &choice.take);
-        let ratio = row.ratio.iter().flatten();
-        let operands = row.sum.iter().chain(&row.less).chain(&row.product).chain(ratio).chain(taken);
-        let count = operands.filter(is).count();
+        let count = row.operands().filter(is).count();
         let selects = row.by.as_ref().is_some_and(|by| is(&by));
         let found = self.dictionary.parameter(writes.get_ref());
         let problem = match found {
@@ -407,13 +491,20 @@ impl Builder<'_, '_> {
         }
         way.push(at);
         let looked = self.looked;
-        let Looked { parameter, ways, factor, rounding, row } = &looked[at];
+        let Looked { parameter, ways, factor, rounding, row, modes } = &looked[at];
         let operation = match ways {
             Ways::Sum(plus, less) => Operation::Sum(self.operands(plus, way)?, self.operands(less, way)?),
             Ways::Product(factors) => Operation::Product(self.operands(factors, way)?),
             Ways::Ratio([dividend, divisor]) => {
                 Operation::Ratio(self.operand(dividend, way)?, self.operand(divisor, way)?)
             }
+            Ways::Limit(value, [least, most, within], holds) => Operation::Limit(Limit {
+                value: self.operand(value, way)?,
+                least: self.operands(least, way)?,
+                most: self.operands(most, way)?,
+                within: self.operands(within, way)?,
+                holds: *holds,
+            }),
             Ways::Selection(by, choices) => {
                 let by = self.operand(by, way)?;
                 let mut taken = Vec::with_capacity(choices.len());
@@ -431,6 +522,7 @@ impl Builder<'_, '_> {
             rounding: *rounding,
             range: parameter.range,
             saturates: row.saturates.is_some(),
+            modes: modes.clone(),
         };
         self.rows.push((at, row));
         Ok(self.rows.len() - 1)
@@ -441,27 +533,50 @@ impl Builder<'_, '_> {
     }
 
     fn operand(&mut self, named: &Named<'_>, way: &mut Vec<usize>) -> Result<Operand, Vec<usize>> {
-        let parameter = match named {
+        let (parameter, is_zero_if_missing) = match named {
             Named::Constant(_, value) => return Ok(Operand::Constant(*value)),
-            Named::Parameter(parameter) => *parameter,
+            Named::Signal(signal, parameter) => {
+                let (signal, parameter) = (Some(*signal), *parameter);
+                return Ok(Operand::Read(self.read(Read {
+                    signal,
+                    parameter,
+                    is_zero_if_missing: false,
+                    range: None,
+                })));
+            }
+            Named::Parameter(parameter, is_zero_if_missing) => (*parameter, *is_zero_if_missing),
         };
-        let is = |other: &Looked<'_>| other.parameter.parameter == parameter.parameter;
+        let number = parameter.parameter;
+        let turns = Some(MOTOR_TURNS).filter(|_| number == Parameter::MOTOR_TURNS_PER_UNIT);
+        let range = parameter.range.or(turns);
+        let read = Read { signal: None, parameter: Some(number), is_zero_if_missing, range };
+        let is = |other: &Looked<'_>| other.parameter.parameter == number;
         if let Some(at) = self.looked.iter().position(is) {
-            return Ok(Operand::Row(self.row(at, way)?));
+            let row = self.row(at, way)?;
+            // No drive has a vendor's parameter that is computed; one of the catalogue is computed for drives without it.
+            return Ok(if number.is_of_vendor() {
+                Operand::Row(row)
+            } else {
+                Operand::ReadOrRow(self.read(read), row)
+            });
         }
-        let read = Read { parameter: parameter.parameter, range: parameter.range };
-        let known = self.reads.iter().position(|known| known.parameter == read.parameter);
-        Ok(Operand::Read(known.unwrap_or_else(|| {
+        Ok(Operand::Read(self.read(read)))
+    }
+
+    /// The place of something that is not computed.
+    fn read(&mut self, read: Read) -> usize {
+        let known = self.reads.iter().position(|known| *known == read);
+        known.unwrap_or_else(|| {
             self.reads.push(read);
             self.reads.len() - 1
-        })))
+        })
     }
 
     /// The computation of the row that was added last.
     fn finish(self, resolver: &mut Resolver<'_>, looked: &Looked<'_>) -> Option<Computation> {
         let (reads, rows) = (self.reads, self.rows);
         let limits =
-            [("parameters of the drive", reads.len(), READS_MAX), ("computed values", rows.len(), ROWS_MAX)];
+            [("parameters and signals", reads.len(), READS_MAX), ("computed values", rows.len(), ROWS_MAX)];
         for (what, count, limit) in limits {
             if count > limit {
                 let message = format!("expected at most {limit} {what} behind one value, got {count}");
@@ -490,17 +605,19 @@ fn self_is(looked: &Looked<'_>, name: &Name, read: &Read) -> bool {
         Ways::Product(factors) => factors.iter().collect(),
         Ways::Ratio(both) => both.iter().collect(),
         Ways::Selection(_, choices) => choices.iter().map(|(_, taken)| taken).collect(),
+        // Nothing is written for a limit.
+        Ways::Limit(..) => Vec::new(),
     };
     named.into_iter().any(|named| match named {
-        Named::Parameter(parameter) => {
-            parameter.name == *name.get_ref() && parameter.parameter == read.parameter
+        Named::Parameter(parameter, _) => {
+            parameter.name == *name.get_ref() && Some(parameter.parameter) == read.parameter
         }
-        Named::Constant(..) => false,
+        Named::Constant(..) | Named::Signal(..) => false,
     })
 }
 
 /// What a quantity is made of, and how many decimal places its unit is below that. Turns and millimetres are no radians and
-/// metres: a power is not a torque times a velocity here.
+/// metres: a power is not a torque times a velocity here. A newton metre is a volt ampere second.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Dimension {
     /// Powers of the base units, in the order of [`BASE`].
@@ -510,29 +627,29 @@ struct Dimension {
 }
 
 /// What everything is made of.
-const BASE: [&str; 6] = ["axis units", "s", "V", "A", "Nm", "kgm2"];
+const BASE: [&str; 5] = ["axis units", "s", "V", "A", "kgm2"];
 
 impl Dimension {
     /// Of a quantity; that of a temperature, which nothing is multiplied with, is of no use.
     // Flat: a table.
     const fn of(quantity: Quantity) -> Self {
         let (base, decimals) = match quantity {
-            Quantity::None | Quantity::Temperature => ([0, 0, 0, 0, 0, 0], 0),
-            Quantity::Torque | Quantity::Fraction => ([0, 0, 0, 0, 0, 0], -6),
-            Quantity::Position => ([1, 0, 0, 0, 0, 0], -9),
-            Quantity::Velocity => ([1, -1, 0, 0, 0, 0], -9),
-            Quantity::Acceleration => ([1, -2, 0, 0, 0, 0], -9),
-            Quantity::Jerk => ([1, -3, 0, 0, 0, 0], -9),
-            Quantity::TorqueAbsolute => ([0, 0, 0, 0, 1, 0], -6),
-            Quantity::Current => ([0, 0, 0, 1, 0, 0], -6),
-            Quantity::Voltage => ([0, 0, 1, 0, 0, 0], -6),
-            Quantity::Power => ([0, 0, 1, 1, 0, 0], -3),
-            Quantity::Time => ([0, 1, 0, 0, 0, 0], -9),
-            Quantity::Frequency => ([0, -1, 0, 0, 0, 0], -3),
-            Quantity::Inertia => ([0, 0, 0, 0, 0, 1], -9),
-            Quantity::Resistance => ([0, 0, 1, -1, 0, 0], -6),
-            Quantity::Inductance => ([0, 1, 1, -1, 0, 0], -9),
-            Quantity::Gain => ([0, -1, 0, 0, 0, 0], -6),
+            Quantity::None | Quantity::Temperature => ([0, 0, 0, 0, 0], 0),
+            Quantity::Torque | Quantity::Fraction => ([0, 0, 0, 0, 0], -6),
+            Quantity::Position => ([1, 0, 0, 0, 0], -9),
+            Quantity::Velocity => ([1, -1, 0, 0, 0], -9),
+            Quantity::Acceleration => ([1, -2, 0, 0, 0], -9),
+            Quantity::Jerk => ([1, -3, 0, 0, 0], -9),
+            Quantity::TorqueAbsolute => ([0, 1, 1, 1, 0], -6),
+            Quantity::Current => ([0, 0, 0, 1, 0], -6),
+            Quantity::Voltage => ([0, 0, 1, 0, 0], -6),
+            Quantity::Power => ([0, 0, 1, 1, 0], -3),
+            Quantity::Time => ([0, 1, 0, 0, 0], -9),
+            Quantity::Frequency => ([0, -1, 0, 0, 0], -3),
+            Quantity::Inertia => ([0, 0, 0, 0, 1], -9),
+            Quantity::Resistance => ([0, 0, 1, -1, 0], -6),
+            Quantity::Inductance => ([0, 1, 1, -1, 0], -9),
+            Quantity::Gain => ([0, -1, 0, 0, 0], -6),
         };
         Self { base, decimals }
     }

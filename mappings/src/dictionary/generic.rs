@@ -122,7 +122,7 @@ impl GenericDictionary {
         };
         let Some(known) = self.parameter(row.name.get_ref()) else { return };
         let counts = self.computations.iter().any(|computation| {
-            computation.reads.iter().any(|read| read.parameter == known.parameter)
+            computation.reads.iter().any(|read| read.parameter == Some(known.parameter))
                 || computation.rows.iter().any(|row| row.parameter == known.parameter)
         });
         if !counts && known.parameter.is_of_vendor() {
@@ -152,7 +152,7 @@ impl GenericDictionary {
         self.parameters.iter().find(|known| known.parameter == parameter)
     }
 
-    /// How the value of a parameter is computed; `None` for one that drives have.
+    /// How the value of a parameter is computed, of the catalogue in drives that lack it; `None` for one that only drives have.
     pub fn computation(&self, parameter: Parameter) -> Option<&Computation> {
         let of = |computation: &Computation| computation.rows.last().map(|row| row.parameter);
         let at = self.computations.binary_search_by_key(&Some(parameter), of).ok()?;

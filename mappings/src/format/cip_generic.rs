@@ -451,7 +451,7 @@ pub struct RejectRow {
 pub struct CipAttributeRow {
     /// The attribute.
     pub attribute: Name,
-    /// Generic parameter behind it.
+    /// Generic parameter behind it. With a `signal` as well, it is read while the signal has no value.
     pub parameter: Option<Name>,
     /// Signal behind it.
     pub signal: Option<Name>,

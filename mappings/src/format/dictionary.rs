@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::finding::Spanned;
 
-use super::{Name, RatioRow, Source};
+use super::{Name, RatioRow, Source, listed};
 
 /// `mappings/tables/dictionary/generic.toml`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -19,10 +19,10 @@ pub struct GenericFile {
     pub signal: Vec<SignalRow>,
     /// Parameters outside the process image.
     pub parameter: Vec<ParameterRow>,
-    /// Constants that computed values use. Only overlays have some.
+    /// Constants that computed values use.
     #[serde(default)]
     pub constant: Vec<ConstantRow>,
-    /// Parameters whose values are computed from others. Only overlays have some.
+    /// Parameters whose values are computed from others.
     #[serde(default)]
     pub computed: Vec<ComputedRow>,
 }
@@ -81,8 +81,8 @@ pub struct ConstantRow {
     pub source: Source,
 }
 
-/// A parameter of an overlay whose value is computed: one of `sum`, `product`, `ratio` and `selection` of other parameters and of
-/// constants, times `factor`.
+/// A parameter whose value is computed: one of `sum`, `product`, `ratio`, `selection` and `limit` of other parameters, of signals and of
+/// constants, times `factor`. One of an overlay is in no drive; one of the catalogue is computed for drives that lack it.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ComputedRow {
@@ -104,6 +104,31 @@ pub struct ComputedRow {
     pub selection: Vec<ChoiceRow>,
     /// Whose value selects.
     pub by: Option<Name>,
+    /// What is limited by `least`, `most` and `within`.
+    pub limit: Option<Name>,
+    /// Lower ends of `limit`: the highest that the drive has counts.
+    #[serde(default)]
+    pub least: Vec<Name>,
+    /// Upper ends of `limit`: the lowest that the drive has counts.
+    #[serde(default)]
+    pub most: Vec<Name>,
+    /// Ends of `limit` in both directions, as magnitudes.
+    #[serde(default)]
+    pub within: Vec<Name>,
+    /// What a value is that is not between its ends: `hold` (at the end, the default) or `none` (no value: what it is computed from does
+    /// not say how much more was asked for).
+    pub at_limit: Option<Name>,
+    /// The operands that are signals: values of the process image at the moment of the access. One that the drive does not send is
+    /// read as the parameter of that name; an offset is not.
+    #[serde(default)]
+    pub signals: Vec<Name>,
+    /// The operands that are 0 in a drive without the parameter: terms that the loops of its profile do not have.
+    #[serde(default)]
+    pub zero_if_missing: Vec<Name>,
+    /// Operating modes in which it is computed. In others, and without torque, the value is 0; while the drive moves by itself there is
+    /// none. Default: always.
+    #[serde(default)]
+    pub modes: Vec<Name>,
     /// What the result is multiplied by; a bare number. Units are converted without it.
     pub factor: Option<RatioRow>,
     /// How the result becomes a whole number: `nearest` (default; ties away from zero), `floor` or `toward_zero`.
@@ -125,4 +150,60 @@ pub struct ChoiceRow {
     pub is: Spanned<i64>,
     /// What is taken then.
     pub take: Name,
+}
+
+impl ComputedRow {
+    /// How the value is computed, in words.
+    pub(crate) fn words(&self) -> String {
+        let row = self;
+        let mut says = String::new();
+        if !row.sum.is_empty() {
+            says = format!("sum of {}", listed(&row.sum));
+            if !row.less.is_empty() {
+                says += &format!(", less {}", listed(&row.less));
+            }
+        } else if !row.product.is_empty() {
+            says = format!("product of {}", listed(&row.product));
+        } else if let Some([dividend, divisor]) = &row.ratio {
+            says = format!("{} over {}", dividend.get_ref(), divisor.get_ref());
+        } else if let Some(by) = &row.by {
+            let taken = |choice: &ChoiceRow| format!("{} at {}", choice.take.get_ref(), choice.is.get_ref());
+            let taken: Vec<String> = row.selection.iter().map(taken).collect();
+            says = format!("selected by {}: {}", by.get_ref(), taken.join(", "));
+        } else if let Some(limited) = &row.limit {
+            says = limited.get_ref().clone();
+            for (word, names) in [("at least", &row.least), ("at most", &row.most), ("within", &row.within)] {
+                if !names.is_empty() {
+                    says += &format!(", {word} {}", listed(names));
+                }
+            }
+            if row.at_limit.as_ref().is_some_and(|word| word.get_ref() == "none") {
+                says += ", none at a limit";
+            }
+        }
+        if let Some(factor) = &row.factor {
+            let [num, den] = factor.get_ref();
+            says += &format!(", times {num}/{den}");
+        }
+        for (word, names) in
+            [("signals", &row.signals), ("0 if missing", &row.zero_if_missing), ("in the modes", &row.modes)]
+        {
+            if !names.is_empty() {
+                says += &format!(", {word} {}", listed(names));
+            }
+        }
+        says += &format!(", rounded {}", row.rounding.as_ref().map_or("nearest", |name| name.get_ref()));
+        if row.saturates.is_some() {
+            says += ", saturates";
+        }
+        says
+    }
+
+    /// Everything that it computes with, but what selects.
+    pub(crate) fn operands(&self) -> impl Iterator<Item = &Name> {
+        let taken = self.selection.iter().map(|choice| &choice.take);
+        let plain = self.sum.iter().chain(&self.less).chain(&self.product).chain(self.ratio.iter().flatten());
+        let ends = self.least.iter().chain(&self.most).chain(&self.within);
+        plain.chain(taken).chain(&self.limit).chain(ends)
+    }
 }

@@ -335,6 +335,9 @@ pub struct Cia402ParameterRow {
     pub common: Option<Name>,
     /// `both`, `to_drive` or `from_drive`.
     pub direction: Name,
+    /// Field of the polarity by which the drive inverts the value, or `none`: of a drive that inverts its positions and not this value,
+    /// or the other way round, the sign is the opposite. Default: the value has no direction, or goes with the positions.
+    pub polarity: Option<Name>,
     /// What happens when the drive has no such object: `reject`, which is the default.
     pub missing: Option<Name>,
     /// Factor between parameter and object, for signs (`[-1, 1]`).

@@ -470,6 +470,9 @@ pub struct SercosParameterRow {
     /// No source reports the unit: the drive's element 4 does, or the parameter is missing.
     #[serde(default)]
     pub unit_by_drive: bool,
+    /// The operation mode in which the drive goes by it. A drive that works in another one of the same `[[mode]]` row has no such
+    /// parameter.
+    pub acts_in: Option<Name>,
     /// Where it comes from.
     pub source: Source,
     /// Worked examples.

@@ -45,7 +45,22 @@ const METHODS: &[Section] = &[first("methods", &["pattern"])];
 
 /// A computed value has one way in which it is computed.
 const COMPUTED: Section = Section {
-    either: &["sum", "less", "product", "ratio", "selection", "by"],
+    either: &[
+        "sum",
+        "less",
+        "product",
+        "ratio",
+        "selection",
+        "by",
+        "limit",
+        "least",
+        "most",
+        "within",
+        "at_limit",
+        "signals",
+        "zero_if_missing",
+        "modes",
+    ],
     ..section("computed", &["parameter"])
 };
 

@@ -651,9 +651,18 @@ impl Compiler<'_> {
         Mechanics { kind, gear, travel: travel.filter(|_| kind == UnitKind::Linear) }
     }
 
+    /// Whether the drive works in another operation mode than this one, in a mode of the axis that has both.
+    fn works_without(&self, code: u16) -> bool {
+        let rules = self.tables.modes.iter().filter(|rule| self.axis.modes.contains(&rule.selection));
+        let mut rules = rules.filter(|rule| rule.codes.contains(&code));
+        // They are tried in order: the first that the drive lists.
+        rules.any(|rule| self.codes(rule).first().is_some_and(|first| *first != code))
+    }
+
     /// The entry of a parameter; `None` when the drive lacks it or does not report its unit.
     pub fn parameter(&self, rule: &ParameterRule) -> Result<Option<ParameterEntry>, SercosError> {
-        if self.facts.is_missing(rule.at.idn) {
+        if self.facts.is_missing(rule.at.idn) || rule.at.acts_in.is_some_and(|code| self.works_without(code))
+        {
             return Ok(None);
         }
         let Some(width) = self.facts.width(rule.at.idn, self.dictionary) else { return Ok(None) };

@@ -4,7 +4,8 @@ use profile_generic::ratio::{Ratio, Rounding};
 
 use super::*;
 use crate::check::texts;
-use crate::computed::{Computation, Known, NoValue, Operand, Operation, Read, Row};
+use crate::computed::{Computation, Control, Fact, Known, Limit, NoValue, Operand, Operation, Read, Row};
+use profile_generic::mode::OperatingMode;
 
 const EXAMPLE: &str = include_str!("../../../examples/overlays/computed.toml");
 
@@ -29,7 +30,7 @@ fn computation(name: &str) -> Computation {
 
 fn known(values: &[i64]) -> Known {
     let mut known = Known::default();
-    known.iter_mut().zip(values).for_each(|(place, value)| *place = Some(*value));
+    known.facts.iter_mut().zip(values).for_each(|(place, value)| *place = Fact::Value(*value));
     known
 }
 
@@ -100,9 +101,21 @@ fn the_example_is_clean_and_its_values_are_right() {
 
 fn row(operation: Operation, factor: (i64, i64), rounding: Rounding) -> Computation {
     let factor = Ratio::new(factor.0, factor.1).unwrap();
-    let read = |number| Read { parameter: Parameter(number), range: None };
-    let row =
-        Row { parameter: Parameter(0x8000), operation, factor, rounding, range: None, saturates: false };
+    let read = |number| Read {
+        signal: None,
+        parameter: Some(Parameter(number)),
+        is_zero_if_missing: false,
+        range: None,
+    };
+    let row = Row {
+        parameter: Parameter(0x8000),
+        operation,
+        factor,
+        rounding,
+        range: None,
+        saturates: false,
+        modes: Vec::new(),
+    };
     Computation { reads: vec![read(0x8001), read(0x8002)], rows: vec![row], written: Some(0) }
 }
 
@@ -203,7 +216,7 @@ fn one_operation_with_known_operands() {
     wrong("{ is = 1, take", "{ is = 0, take", &["AX0014", "0 selects something already"]);
     wrong(
         "parameter = \"dc_load\"\nratio",
-        "parameter = \"energy\"\nratio",
+        "parameter = \"jerk_limit\"\nratio",
         &["AX0010", "number from 0x8000"],
     );
     wrong("name = \"filter_tick\"", "name = \"filter_ticks\"", &["AX0014", "of this name is there already"]);
@@ -329,4 +342,219 @@ fn computed_values_are_operands_too() {
     let twice = mapping.dictionaries.generic.computation(Parameter(0x8031)).unwrap();
     assert_eq!((twice.reads.len(), twice.rows.len()), (3, 2));
     assert_eq!(twice.value(&known(&[0, 21])), Ok(42));
+}
+
+/// A row with a limit between 0 and 10, or the tighter one of both directions.
+fn limited(holds: bool) -> Computation {
+    let limit = Limit {
+        value: A,
+        least: vec![Operand::Constant(-20), B],
+        most: vec![Operand::Constant(10)],
+        within: vec![Operand::Constant(15)],
+        holds,
+    };
+    row(Operation::Limit(limit), (1, 1), Rounding::Nearest)
+}
+
+#[test]
+fn a_limit_holds_a_value_or_leaves_it_unknown() {
+    let [held, open] = [limited(true), limited(false)];
+    for (value, end, expected, is_between) in [
+        (5, -18, 5, true),
+        (10, -18, 10, false),
+        (11, -18, 10, false),
+        (-14, -18, -14, true),
+        (-15, -18, -15, false),
+        (-40, -18, -15, false),
+        (-40, -3, -3, false),
+    ] {
+        assert_eq!(held.value(&known(&[value, end])), Ok(expected), "{value}");
+        let open = open.value(&known(&[value, end]));
+        assert_eq!(open, if is_between { Ok(value) } else { Err(NoValue::Limited) }, "{value}");
+    }
+    assert_eq!(held.value(&known(&[1, 11])), Err(NoValue::Beyond), "ends that contradict each other");
+    assert_eq!(held.value(&known(&[1])), Err(NoValue::Needs(1)));
+    // An end that the drive does not have does not count.
+    let mut lacks = known(&[-40]);
+    lacks.facts[1] = Fact::Absent;
+    assert_eq!(held.value(&lacks), Ok(-15));
+    assert_eq!(held.solve(1, &known(&[1, 1])), Err(NoValue::ReadOnly));
+    let limit = |least, holds| Limit { value: A, least, most: vec![], within: vec![], holds };
+    let without = |holds| row(Operation::Limit(limit(vec![B], holds)), (1, 1), Rounding::Nearest);
+    assert_eq!(without(true).value(&known(&[70, 1])), Ok(70), "no upper end");
+    assert_eq!(
+        without(false).value(&known(&[70, 1])),
+        Err(NoValue::Absent(0)),
+        "nobody knows whether one acts"
+    );
+}
+
+#[test]
+fn a_row_of_some_modes_is_0_in_others_and_unknown_while_the_drive_moves_by_itself() {
+    let mut made = row(Operation::Sum(vec![A], vec![]), (1, 1), Rounding::Nearest);
+    made.rows[0].modes = vec![OperatingMode::Position];
+    let value = |control, facts: Known| made.value(&Known { control, ..facts });
+    assert_eq!(value(Control::Led(OperatingMode::Position), known(&[7])), Ok(7));
+    assert_eq!(value(Control::Led(OperatingMode::Position), Known::default()), Err(NoValue::Needs(0)));
+    for control in [Control::Led(OperatingMode::Velocity), Control::Off] {
+        assert_eq!(value(control, Known::default()), Ok(0), "nothing is asked for: {control:?}");
+    }
+    assert_eq!(value(Control::Drive, known(&[7])), Err(NoValue::Mode));
+}
+
+#[test]
+fn what_a_drive_lacks_is_told_from_what_is_silent_and_what_is_0_for_certain() {
+    let mut made = row(Operation::Product(vec![A, B]), (1, 1), Rounding::Nearest);
+    let value = |made: &Computation, fact| made.value(&Known { facts: [fact; 24], ..Known::default() });
+    assert_eq!(value(&made, Fact::Absent), Err(NoValue::Absent(0)));
+    assert_eq!(value(&made, Fact::Silent), Err(NoValue::Silent(0)));
+    // With a factor of 0 the others do not matter.
+    made.reads[1].is_zero_if_missing = true;
+    assert_eq!(value(&made, Fact::Absent), Ok(0));
+    // The drive's own value counts where it has one; in a mode of other values the row is 0 all the same.
+    let own = Operand::ReadOrRow(0, 0);
+    let inner = row(Operation::Sum(vec![B], vec![]), (1, 1), Rounding::Nearest).rows.remove(0);
+    let mut both = row(Operation::Sum(vec![own], vec![]), (1, 1), Rounding::Nearest);
+    both.rows.insert(0, inner);
+    assert_eq!(both.value(&known(&[3, 4])), Ok(3));
+    let mut lacks = known(&[3, 4]);
+    lacks.facts[0] = Fact::Absent;
+    assert_eq!(both.value(&lacks), Ok(4));
+    both.rows[0].modes = vec![OperatingMode::Velocity];
+    assert_eq!(both.value(&known(&[3, 4])), Ok(0));
+}
+
+const LIMITED: &str = "limit = \"dc_current\"\nmost = [\"dc_current_rated\"]\n";
+
+/// The reserve of the example as a limit.
+#[track_caller]
+fn wrong_limit(rows: &str, expected: &[&str]) {
+    wrong("sum = [\"dc_current_rated\"]\nless = [\"dc_current\"]\n", rows, expected);
+}
+
+#[test]
+fn signals_and_limits_are_checked() {
+    let plain = "sum = [\"dc_current_rated\"]\nless = [\"dc_current\"]\n";
+    let good = |rows: &str| {
+        let found = checked(&EXAMPLE.replacen(plain, rows, 1));
+        assert_eq!(found, Vec::<String>::new(), "{rows}");
+    };
+    good(LIMITED);
+    good(
+        "sum = [\"current_actual\"]\nless = [\"dc_current\"]\nsignals = [\"current_actual\"]\nmodes = [\"position\"]\n",
+    );
+    wrong_limit("limit = \"dc_current\"\n", &["AX0007", "`least`, `most` or `within`"]);
+    wrong_limit(
+        "limit = \"dc_current\"\nmost = [\"dc_voltage\"]\n",
+        &["AX0030", "dc_voltage, which is voltage"],
+    );
+    wrong_limit("sum = [\"dc_current\"]\nmost = [\"dc_current_rated\"]\n", &["AX0015", "expected a `limit`"]);
+    wrong_limit(&format!("{LIMITED}at_limit = \"stop\"\n"), &["AX0012", "hold, none"]);
+    wrong_limit(&format!("{LIMITED}modes = [\"positon\"]\n"), &["AX0010", "did you mean `position`?"]);
+    wrong_limit(
+        "sum = [\"curent_actual\"]\nsignals = [\"curent_actual\"]\n",
+        &["AX0010", "a signal of the generic model", "did you mean `current_actual`?"],
+    );
+    wrong_limit(
+        "sum = [\"dc_current\"]\nsignals = [\"current_actual\"]\n",
+        &["AX0015", "one of the operands of the row"],
+    );
+    wrong_limit(
+        "sum = [\"velocity_actual\"]\nsignals = [\"velocity_actual\"]\n",
+        &["AX0030", "velocity_actual, which is velocity"],
+    );
+    wrong_limit(
+        "sum = [\"current_actual\"]\nsignals = [\"current_actual\"]\nzero_if_missing = [\"current_actual\"]\n",
+        &["AX0015", "this one is a signal"],
+    );
+    // What a controller sets is kept somewhere.
+    wrong(
+        "parameter = \"dc_load\"\nratio",
+        "parameter = \"torque_limit_positive\"\nratio",
+        &["AX0010", "of the catalogue that is only read"],
+    );
+    // An attribute takes a parameter for its signal only where both measure the same.
+    for (attribute, signal, rows, expected) in [
+        ("Position Error", "following_error", "parameter = \"velocity_actual\"", "turns that into velocity"),
+        (
+            "Torque Command",
+            "torque_command",
+            "parameter = \"motor_capacity\"",
+            "measures torque, as torque_command",
+        ),
+        (
+            "Position Error",
+            "following_error",
+            "parameter = \"following_error\"\nmissing = \"zero\"",
+            "only read, and no `missing`",
+        ),
+    ] {
+        let text = format!(
+            "[[cip-generic.attribute]]\nattribute = \"{attribute}\"\nsignal = \"{signal}\"\n{rows}\nsource = \"x\"\n"
+        );
+        wrong_rows(&text, &[expected]);
+    }
+}
+
+/// What is computed by the shipped tables needs no other value that needs it.
+#[test]
+fn shipped_values_that_need_each_other_are_refused() {
+    let text = "format = 1\noverlay = \"x\"\n\n[[generic.computed]]\nparameter = \"velocity_demand\"\n\
+                sum = [\"velocity_error\"]\nsource = \"x\"\n";
+    let found = checked(text);
+    assert!(found.iter().any(|found| found.contains("AX0076")), "{found:?}");
+}
+
+/// The rows of the loops with numbers that were worked out by hand: 50 1/s times 0.02 turns, and half of 2 turns a second.
+#[test]
+fn shipped_rows_of_the_loops_come_out() {
+    let mapping = shipped();
+    let generic = &mapping.dictionaries.generic;
+    let led = Control::Led(OperatingMode::Position);
+    let value = |name: &str, given: &[(&str, i64)]| {
+        let computation = generic.computation(generic.parameter(name).unwrap().parameter).unwrap();
+        let mut known = Known { control: led, ..Known::default() };
+        for (fact, read) in known.facts.iter_mut().zip(&computation.reads) {
+            let name = match read.signal {
+                Some(signal) => signal.name(),
+                None => generic.by_number(read.parameter.unwrap()).unwrap().name.as_str(),
+            };
+            let found = given.iter().find(|(known, _)| *known == name);
+            *fact = found.map_or(Fact::Absent, |(_, value)| Fact::Value(*value));
+        }
+        computation.value(&known)
+    };
+    let given = [
+        ("position_loop_gain", 50_000_000),
+        ("following_error", 20_000_000),
+        ("velocity_feed_forward_gain", 500_000),
+        ("velocity_command", 2_000_000_000),
+        ("velocity_offset", 10_000_000),
+        ("velocity_actual", 1_900_000_000),
+        ("velocity_limit_bipolar", 2_005_000_000),
+    ];
+    assert_eq!(value("position_loop_output", &given), Ok(1_000_000_000));
+    assert_eq!(value("velocity_feed_forward", &given), Ok(1_000_000_000));
+    assert_eq!(value("velocity_reference", &given), Ok(2_005_000_000), "at the limit of the drive");
+    assert_eq!(value("velocity_reference", &given[..6]), Ok(2_010_000_000));
+    assert_eq!(value("velocity_error", &given), Ok(105_000_000));
+    assert_eq!(value("velocity_feed_forward", &given[3..]), Err(NoValue::Absent(0)));
+    assert_eq!(value("acceleration_feed_forward", &[]), Ok(0), "no such gain, and no acceleration set-point");
+    assert_eq!(value("position_integrator_output", &[]), Ok(0));
+    assert_eq!(
+        value("position_integrator_output", &[("position_integral_gain", 3)]),
+        Err(NoValue::Choice(3)),
+        "the drive does not show the state of its integrator"
+    );
+    // A quarter of 2 Nm at 10 turns of the motor a second, 2.5 of the load: 31.416 W.
+    let power = [
+        ("torque_actual", 250_000),
+        ("motor_rated_torque", 2_000_000),
+        ("velocity_actual", 2_500_000_000),
+        ("motor_turns_per_unit", 4_000_000_000),
+    ];
+    assert_eq!(value("output_power", &power), Ok(31_416));
+    // A quarter of 3 A, backwards.
+    let current = [("torque_actual", -250_000), ("motor_rated_current", 3_000_000)];
+    assert_eq!(value("current_actual", &current), Ok(-750_000));
 }

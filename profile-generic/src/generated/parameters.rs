@@ -117,6 +117,10 @@ parameter_rows! {
         "Distance from the set-point within which the axis is at velocity.";
     STANDSTILL_WINDOW = 0x0414, "standstill_window", BasicDrive, Velocity, Integer, Write,
         "Velocity below which the axis stands.";
+    VELOCITY_LIMIT_BIPOLAR = 0x0415, "velocity_limit_bipolar", BasicDrive, Velocity, Integer, Read,
+        "Highest velocity in both directions.";
+    TORQUE_LIMIT_BIPOLAR = 0x0416, "torque_limit_bipolar", BasicDrive, Torque, Integer, Read,
+        "Highest torque in both directions.";
 
     POSITION_LOOP_GAIN = 0x0501, "position_loop_gain", BasicDrive, Gain, Integer, Write,
         "Proportional gain of the position loop.";
@@ -163,6 +167,8 @@ parameter_rows! {
         "Travel of the load in one revolution of its shaft.";
     POSITION_OFFSET = 0x0608, "position_offset", BasicDrive, Position, Integer, WriteWhileDisabled,
         "Position of the machine's zero point.";
+    MOTOR_TURNS_PER_UNIT = 0x0609, "motor_turns_per_unit", BasicDrive, None, Integer, Read,
+        "Revolutions of the motor in one axis unit, in 1e-9; the gateway computes it from gear and feed.";
 
     MOTOR_TYPE = 0x0701, "motor_type", BasicDrive, None, Integer, WriteWhileDisabled,
         "Kind of motor: 0 none, 1 synchronous, 2 induction, 3 linear synchronous, 4 linear induction.";
@@ -258,6 +264,42 @@ parameter_rows! {
         "Digital inputs, bit 0 first.";
     DIGITAL_OUTPUTS = 0x0911, "digital_outputs", BasicDrive, None, Integer, Write,
         "Digital outputs, bit 0 first.";
+    POSITION_PROPORTIONAL_OUTPUT = 0x0921, "position_proportional_output", BasicDrive, Velocity, Integer, Read,
+        "Position error times the gain of the position loop.";
+    POSITION_INTEGRATOR_OUTPUT = 0x0922, "position_integrator_output", BasicDrive, Velocity, Integer, Read,
+        "Output of the integrator of the position loop.";
+    POSITION_LOOP_OUTPUT = 0x0923, "position_loop_output", BasicDrive, Velocity, Integer, Read,
+        "Output of the position loop without what is fed forward.";
+    VELOCITY_FEED_FORWARD = 0x0924, "velocity_feed_forward", BasicDrive, Velocity, Integer, Read,
+        "Velocity that is fed forward to the output of the position loop.";
+    VELOCITY_TRIM_IN_POSITION = 0x0925, "velocity_trim_in_position", BasicDrive, Velocity, Integer, Read,
+        "Velocity offset that is added to the output of the position loop.";
+    VELOCITY_DEMAND = 0x0926, "velocity_demand", BasicDrive, Velocity, Integer, Read,
+        "Velocity set-point of velocity control, downstream of the ramps of the drive.";
+    VELOCITY_SUM = 0x0927, "velocity_sum", BasicDrive, Velocity, Integer, Read,
+        "Sum of all set-points of the velocity loop, upstream of its limits.";
+    VELOCITY_REFERENCE = 0x0928, "velocity_reference", BasicDrive, Velocity, Integer, Read,
+        "Velocity that the velocity loop follows.";
+    ACCELERATION_FEED_FORWARD = 0x0929, "acceleration_feed_forward", BasicDrive, Acceleration, Integer, Read,
+        "Acceleration that is fed forward to the output of the velocity loop.";
+    TORQUE_DEMAND = 0x092A, "torque_demand", BasicDrive, Torque, Integer, Read,
+        "Torque that the drive asks of its torque loop, downstream of its limits.";
+    TORQUE_OF_LOOPS = 0x092B, "torque_of_loops", BasicDrive, Torque, Integer, Read,
+        "Torque that the position and velocity loops ask for, while no limit holds it.";
+    TORQUE_OF_COMMAND = 0x092C, "torque_of_command", BasicDrive, Torque, Integer, Read,
+        "Torque set-point of torque control.";
+    TORQUE_REFERENCE = 0x092D, "torque_reference", BasicDrive, Torque, Integer, Read,
+        "Torque that is asked for, upstream of the limits.";
+    TORQUE_REFERENCE_LIMITED = 0x092E, "torque_reference_limited", BasicDrive, Torque, Integer, Read,
+        "Torque that is asked for, downstream of the limits.";
+    TORQUE_CURRENT = 0x092F, "torque_current", BasicDrive, Torque, Integer, Read,
+        "Torque producing current, in parts of the rated current.";
+    MOTOR_TORQUE = 0x0930, "motor_torque", BasicDrive, TorqueAbsolute, Integer, Read,
+        "Torque of the motor.";
+    MOTOR_SPEED = 0x0931, "motor_speed", BasicDrive, Velocity, Integer, Read,
+        "Revolutions of the motor per second.";
+    MOTOR_ANGULAR_VELOCITY = 0x0932, "motor_angular_velocity", BasicDrive, Gain, Integer, Read,
+        "Angular velocity of the motor in radians per second.";
 
     BUS_VOLTAGE = 0x0A01, "bus_voltage", BasicDrive, Voltage, Integer, Read,
         "Voltage of the DC bus.";
@@ -287,6 +329,10 @@ parameter_rows! {
         "Time for which the power stage has been on since it was built.";
     ENERGY = 0x0A0E, "energy", BasicDrive, None, Integer, Read,
         "Energy taken by the motor, in milliwatt hours.";
+    DRIVE_RATED_CURRENT = 0x0A0F, "drive_rated_current", BasicDrive, Current, Integer, Read,
+        "Rated output current of the power stage.";
+    DRIVE_PEAK_CURRENT = 0x0A10, "drive_peak_current", BasicDrive, Current, Integer, Read,
+        "Peak output current of the power stage.";
 
     STOPPING_ACTION = 0x0B01, "stopping_action", BasicDrive, None, Integer, Write,
         "How a disable stops the axis: 0 coast, 1 decelerate, 2 at the current limit.";

@@ -24,6 +24,7 @@ mod indicators;
 mod inputs;
 mod limits;
 mod local;
+mod loops;
 mod loss;
 mod many;
 mod modes;

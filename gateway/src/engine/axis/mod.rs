@@ -65,13 +65,14 @@ pub use self::start_stop::StopSettings;
 pub use self::tolerance::Tolerances;
 pub use self::waiting::{Awaited, Waiting};
 
-use crate::mapping::DriveProgram;
+use crate::mapping::{Control, DriveProgram};
 use profile_generic::capture::{CaptureResult, CaptureSet};
 use profile_generic::fault::{Fault, Reaction};
 use profile_generic::fault_set::{ActiveFault, FaultSet};
 use profile_generic::hookup::TestReport;
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, Signal};
 use profile_generic::interpolation::UpdateError;
+use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::sequence::SequenceStep;
 use profile_generic::state::{Action, BasicDrive, DriveState, Report};
@@ -288,6 +289,22 @@ impl AxisChannel {
             None if signal.is_command() => self.command.get(signal),
             None => self.feedback.get(signal),
             trim => trim,
+        }
+    }
+
+    /// What leads the axis, for what follows from its loops.
+    #[must_use]
+    pub fn control(&self) -> Control {
+        let state = self.state();
+        let led = state == DriveState::Operating && self.drive.action == Action::Enable;
+        match self.command.selection() {
+            _ if !state.may_have_torque() => Control::Off,
+            ModeSelection { mode, interpolation: InterpolationSource::Controller }
+                if led && mode != OperatingMode::Homing =>
+            {
+                Control::Led(mode)
+            }
+            _ => Control::Drive,
         }
     }
 

@@ -33,7 +33,7 @@ pub(super) struct Accesses {
     comparison: Option<Comparison>,
     /// Values that are being compared with those of the drive: ticket and bytes.
     confirmations: ArrayVec<(u32, ArrayVec<u8, 8>), WRITES_MAX>,
-    /// Values that are computed from what the drive has.
+    /// Values that are computed from what the drive has, and signals that are in no telegram.
     computed: ParameterJobs<Computed>,
 }
 
@@ -70,6 +70,11 @@ impl Accesses {
     ) -> Result<(), GeneralStatus> {
         let entry = *on.attributes.get(access.id).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let (parameter, missing) = match entry.backing {
+            Backing::Signal { signal, otherwise: Some(parameter), .. }
+                if on.axis.signal(signal).is_none() =>
+            {
+                return self.compute(access, &entry, parameter);
+            }
             Backing::Signal { .. } => return on.read_signal(access),
             Backing::Parameter { parameter, missing, .. } => (parameter, missing),
             Backing::Mechanics(fact) => return on.compare_mechanics(access, &entry, fact, notice),

@@ -17,8 +17,6 @@ use crate::finding::{Source, Spanned};
 use crate::format::{FieldValueRow, Name, RatioRow, UnitRow, listed};
 use crate::{Mapping, TableTexts};
 
-pub(super) use vendor::computation;
-
 /// What a change is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Aspect {

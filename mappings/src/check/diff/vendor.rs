@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::{Aspect, Fact, Reader, text};
 use crate::Mapping;
 use crate::finding::Spanned;
-use crate::format::{ComputedRow, Name, listed};
+use crate::format::Name;
 
 /// How much access each word gives, from the least to the most.
 const ACCESSES: [&str; 3] = ["read", "write_while_disabled", "write"];
@@ -47,43 +47,13 @@ fn own(mapping: &Mapping) -> Vec<Fact<'_>> {
     }
     for row in &file.rows.computed {
         let id = ("computed", row.parameter.get_ref().as_str());
-        reader.say(id, Aspect::Scale, computation(row), row.parameter.span());
+        reader.say(id, Aspect::Scale, row.words(), row.parameter.span());
         let writes = row.writes.as_ref();
         let says = writes.map_or_else(|| "read".to_owned(), |name| format!("writes {}", name.get_ref()));
         let span = writes.map_or(row.parameter.span(), Name::span);
         reader.say(id, Aspect::Binding, says, span);
     }
     reader.facts
-}
-
-/// How a value is computed, in words.
-pub(in crate::check) fn computation(row: &ComputedRow) -> String {
-    let mut says = String::new();
-    if !row.sum.is_empty() {
-        says = format!("sum of {}", listed(&row.sum));
-        if !row.less.is_empty() {
-            says += &format!(", less {}", listed(&row.less));
-        }
-    } else if !row.product.is_empty() {
-        says = format!("product of {}", listed(&row.product));
-    } else if let Some([dividend, divisor]) = &row.ratio {
-        says = format!("{} over {}", dividend.get_ref(), divisor.get_ref());
-    } else if let Some(by) = &row.by {
-        let taken = |choice: &crate::format::ChoiceRow| {
-            format!("{} at {}", choice.take.get_ref(), choice.is.get_ref())
-        };
-        let taken: Vec<String> = row.selection.iter().map(taken).collect();
-        says = format!("selected by {}: {}", by.get_ref(), taken.join(", "));
-    }
-    if let Some(factor) = &row.factor {
-        let [num, den] = factor.get_ref();
-        says += &format!(", times {num}/{den}");
-    }
-    says += &format!(", rounded {}", row.rounding.as_ref().map_or("nearest", |name| name.get_ref()));
-    if row.saturates.is_some() {
-        says += ", saturates";
-    }
-    says
 }
 
 /// The attributes of vendors' parameters.

@@ -15,7 +15,6 @@ use super::super::axes::obedient;
 use super::diagram::{Diagram, Side};
 use super::{escaped, name};
 use crate::attributes::{AttributeTable, Backing};
-use crate::check::diff::computation;
 use crate::dictionary::IdnUnit;
 use crate::finding::Source;
 use crate::format::{FieldValueRow, Name, listed};
@@ -242,10 +241,10 @@ impl<'m> Joined<'m> {
     fn parameter(&self, row: &GenericParameter) -> [Vec<Cell>; 4] {
         let (parameter, quantity, name) = (row.parameter, row.quantity, row.name.as_str());
         let tables = self.mapping.tables();
-        let north = self.attributes(
-            quantity,
-            |backing| matches!(backing, Backing::Parameter { parameter: own, .. } if *own == parameter),
-        );
+        let north = self.attributes(quantity, |backing| {
+            matches!(backing, Backing::Parameter { parameter: own, .. } if *own == parameter)
+                || matches!(backing, Backing::Signal { otherwise: Some(own), .. } if *own == parameter)
+        });
         let held = |program: &Option<DriveProgram>| {
             let entry = program.as_ref()?.parameter(parameter)?;
             Some((entry.item, entry.to_drive.or_else(|| entry.from_drive?.inverse())?))
@@ -260,7 +259,7 @@ impl<'m> Joined<'m> {
         let cia402 = rows.map(|row| self.south(&file.text, &row.object, quantity, of_cia402.as_slice()));
         let computed = tables.generic.rows.computed.iter().find(|row| row.parameter.get_ref() == name);
         let about = match computed {
-            Some(row) => format!("computed, {}", computation(row)),
+            Some(row) => format!("computed, {}", row.words()),
             None if parameter.is_of_vendor() => "vendor".to_owned(),
             None => String::new(),
         };

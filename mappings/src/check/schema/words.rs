@@ -10,6 +10,7 @@ use profile_generic::state::{Action, DriveState, Report, Request};
 
 use crate::cip_tables::MISSING;
 use crate::device_link::DRIVE_ACTIONS;
+use crate::dictionary::AT_LIMIT;
 use crate::dictionary::{
     Access, Cia402Access, Cia402Category, Cia402Kind, Cia402Pdo, Cia402RangeKind, Cia402SetKind, Cia402Type,
     CipType, Clearing, Confidence, GroupKind, IdnFormat, Layout, RangeKind,
@@ -89,6 +90,8 @@ fn generic(row: &str, key: &str) -> Option<Vec<&'static str>> {
         ("CipModeRow" | "SercosModeRow" | "ProcedureRow" | "WhenRow" | "StatusRow", "mode") => {
             words(OperatingMode::ALL, OperatingMode::name)
         }
+        ("ComputedRow", "modes") => words(OperatingMode::ALL, OperatingMode::name),
+        ("ComputedRow", "signals") => words(Signal::ALL, Signal::name),
         (_, "quantity") => words(Quantity::ALL, Quantity::name),
         (_, "cause") => FaultCause::NAMED.iter().map(|(_, name)| *name).collect(),
         (_, "reaction" | "abort") => words(Reaction::ALL, Reaction::name),
@@ -116,6 +119,7 @@ fn of_builders(row: &str, key: &str) -> Option<Vec<&'static str>> {
         ("CipAttributeRow", "missing") => named(&MISSING),
         (_, "missing") => named(&REJECTED),
         (_, "refused") => named(&FAILS),
+        ("ComputedRow", "at_limit") => named(&AT_LIMIT),
         (_, "interpolation") => vec!["controller", "drive"],
         (_, "voltage_bit") => named(&VOLTAGE_BIT),
         (_, "served_by") => vec!["device", "connection", "stored", "constant", "mechanics"],

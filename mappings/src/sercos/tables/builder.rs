@@ -616,7 +616,12 @@ impl<'a> Builder<'a> {
         }
         let known = self.tables.parameters.iter().any(|known| known.parameter == rule.parameter);
         once(&mut self.resolver, known, "parameter", &row.parameter);
-        let at = ParameterAt { idn: idn.idn, unit_by_drive: row.unit_by_drive };
+        let acts_in = row.acts_in.as_ref().and_then(|name| {
+            let sercos = &self.dictionaries.sercos;
+            let code = sercos.code_or_error("Operation mode", "acts_in", name, &mut self.resolver)?;
+            u16::try_from(code).ok()
+        });
+        let at = ParameterAt { idn: idn.idn, unit_by_drive: row.unit_by_drive, acts_in };
         self.tables.parameters.push(rule.at(at));
     }
 

@@ -90,6 +90,8 @@ pub(crate) struct ParameterAt {
     pub idn: Idn,
     /// The drive's element 4 reports the unit.
     pub unit_by_drive: bool,
+    /// The operation mode in which the drive goes by it, where that is one of several for the same.
+    pub acts_in: Option<u16>,
 }
 
 pub(crate) type ParameterRule = crate::drive_rows::ParameterRule<ParameterAt>;
@@ -199,7 +201,7 @@ impl SercosTables {
         let IdnUnit::Scaled(scaling) = &dictionaries.sercos.idn(idn)?.unit else { return None };
         let rule = self.scalings.iter().find(|rule| rule.scaling == *scaling)?;
         let quantity = rule.methods.first()?.quantity;
-        Some(ParameterRule::plain(quantity, ParameterAt { idn, unit_by_drive: false }))
+        Some(ParameterRule::plain(quantity, ParameterAt { idn, unit_by_drive: false, acts_in: None }))
     }
 
     /// Whether a row looks for faults in this word.
