@@ -4,7 +4,7 @@ use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 
 use crate::Mapping;
-use crate::cip_tables::Served;
+use crate::cip_tables::{Missing, Served};
 
 /// The places of one value; a side that has none is empty.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -15,6 +15,8 @@ pub struct Places {
     pub sercos: Vec<String>,
     /// Objects.
     pub cia402: Vec<String>,
+    /// What the gateway does with it; empty where it only passes it.
+    pub gateway: &'static str,
 }
 
 impl Mapping {
@@ -31,6 +33,27 @@ impl Mapping {
             cip,
             sercos: once(sercos.map(|rule| rule.at.idn.to_string())),
             cia402: once(cia402.map(|rule| rule.at.value.object.to_string())),
+            gateway: self.use_of(parameter),
+        }
+    }
+
+    /// What the gateway does with a parameter itself.
+    fn use_of(&self, parameter: Parameter) -> &'static str {
+        if parameter == Parameter::MOTOR_TURNS_PER_UNIT {
+            return "computes it from the scaling of the drive";
+        }
+        if self.dictionaries.generic.computation(parameter).is_some() {
+            return "computes it where the drive has none";
+        }
+        let missing = self.cip.attributes.iter().find_map(|row| match row.served {
+            Served::Parameter { parameter: known, missing, .. } if known == parameter => Some(missing),
+            _ => None,
+        });
+        match missing {
+            Some(Missing::Device) => "goes by it where the drive has none",
+            Some(Missing::Zero) => "takes 0 only where the drive has none",
+            Some(Missing::Stored) => "stores it where the drive has none",
+            Some(Missing::Absent) | None => "",
         }
     }
 
@@ -49,6 +72,11 @@ impl Mapping {
             cip: cyclic.chain(attributes).collect(),
             sercos: once(sercos.map(|rule| rule.idn.to_string())),
             cia402: once(cia402.map(|rule| rule.value.object.to_string())),
+            gateway: match signal {
+                Signal::AccelerationCommand => "interpolates it",
+                Signal::PositionOffset => "adds it to the set-point",
+                _ => "",
+            },
         }
     }
 
@@ -83,6 +111,32 @@ mod tests {
         let limit = mapping.places_of_parameter(Parameter::ACCELERATION_LIMIT);
         assert_eq!(limit.cip, ["485 Acceleration Limit"]);
         assert_eq!(limit.sercos, ["S-0-0136"]);
-        assert_eq!(mapping.places_of_parameter(Parameter::SERIAL_NUMBER), Places::default());
+        let ramp = mapping.places_of_parameter(Parameter::RAMP_ACCELERATION);
+        assert_eq!((ramp.sercos.len(), ramp.gateway), (0, "goes by it where the drive has none"));
+    }
+
+    /// A value that nobody writes and nobody reads is none. One without a place in a drive is for the gateway, or for the overlays of drives
+    /// that have one.
+    #[test]
+    fn each_value_of_the_model_is_somewhere() {
+        let mapping = Mapping::embedded().unwrap();
+        let generic = &mapping.dictionaries.generic;
+        let parameters = generic
+            .parameters()
+            .iter()
+            .map(|row| (row.name.clone(), mapping.places_of_parameter(row.parameter)));
+        let signals = generic
+            .signals()
+            .iter()
+            .map(|signal| (signal.name().to_owned(), mapping.places_of_signal(*signal)));
+        let mut of_overlays = Vec::new();
+        for (name, places) in parameters.chain(signals) {
+            let in_drives = !places.sercos.is_empty() || !places.cia402.is_empty();
+            assert!(in_drives || !places.cip.is_empty() || !places.gateway.is_empty(), "{name} is nowhere");
+            if !in_drives && places.gateway.is_empty() {
+                of_overlays.push(name);
+            }
+        }
+        insta::assert_snapshot!(of_overlays.join("\n"));
     }
 }

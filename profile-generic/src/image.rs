@@ -46,8 +46,7 @@ pub(crate) use signal_rows;
 
 impl Signal {
     /// The offsets, which are added to set-points.
-    pub const OFFSETS: [Self; 4] =
-        [Self::PositionOffset, Self::VelocityOffset, Self::AccelerationOffset, Self::TorqueOffset];
+    pub const OFFSETS: [Self; 3] = [Self::PositionOffset, Self::VelocityOffset, Self::TorqueOffset];
 
     /// Its bit in a [`CommandSet`]; none of a signal of the feedback.
     pub fn command_bit(self) -> CommandSet {
@@ -56,13 +55,14 @@ impl Signal {
         probe.present
     }
 
-    /// The set-point that leads in an operating mode, with the offset that is added to it; `None` for a mode without one.
-    pub const fn leading(mode: OperatingMode) -> Option<(Self, Self)> {
+    /// The set-point that leads in an operating mode, with the offset that is added to it, if there is one; `None` for a mode without a
+    /// set-point.
+    pub const fn leading(mode: OperatingMode) -> Option<(Self, Option<Self>)> {
         match mode {
-            OperatingMode::Position => Some((Self::PositionCommand, Self::PositionOffset)),
-            OperatingMode::Velocity => Some((Self::VelocityCommand, Self::VelocityOffset)),
-            OperatingMode::Acceleration => Some((Self::AccelerationCommand, Self::AccelerationOffset)),
-            OperatingMode::Torque => Some((Self::TorqueCommand, Self::TorqueOffset)),
+            OperatingMode::Position => Some((Self::PositionCommand, Some(Self::PositionOffset))),
+            OperatingMode::Velocity => Some((Self::VelocityCommand, Some(Self::VelocityOffset))),
+            OperatingMode::Acceleration => Some((Self::AccelerationCommand, None)),
+            OperatingMode::Torque => Some((Self::TorqueCommand, Some(Self::TorqueOffset))),
             OperatingMode::None | OperatingMode::Homing => None,
         }
     }
@@ -97,12 +97,8 @@ bitflags! {
         const POSITION_OFFSET = 1 << 4;
         /// [`AxisCommand::velocity_offset`].
         const VELOCITY_OFFSET = 1 << 5;
-        /// [`AxisCommand::acceleration_offset`].
-        const ACCELERATION_OFFSET = 1 << 6;
         /// [`AxisCommand::torque_offset`].
         const TORQUE_OFFSET = 1 << 7;
-        /// [`AxisCommand::digital_outputs`].
-        const DIGITAL_OUTPUTS = 1 << 8;
         /// [`AxisCommand::target_position`].
         const TARGET_POSITION = 1 << 9;
         /// [`AxisCommand::profile_velocity`].
@@ -269,12 +265,8 @@ pub struct AxisCommand {
     pub position_offset: Position,
     /// Added to the velocity set-point: trim and feed-forward.
     pub velocity_offset: Velocity,
-    /// Added to the acceleration set-point: trim and feed-forward.
-    pub acceleration_offset: Acceleration,
     /// Added to the torque set-point: trim and feed-forward.
     pub torque_offset: Torque,
-    /// Digital outputs, bit 0 first.
-    pub digital_outputs: u32,
     /// Target that the drive moves to with a profile of its own, 1e-9 revolution or mm.
     pub target_position: Position,
     /// Highest speed of that profile, 1e-9 revolution/s or mm/s, not negative.
@@ -345,7 +337,7 @@ impl AxisCommand {
     /// Puts the offset of the set-point that leads in this mode into that set-point: the parts downstream see one value, and
     /// the offset is zero. Returns `false`, and changes nothing, when the sum does not fit.
     pub fn add_own_offset(&mut self) -> bool {
-        let Some((command, offset)) = Signal::leading(self.mode) else { return true };
+        let Some((command, Some(offset))) = Signal::leading(self.mode) else { return true };
         let (Some(value), Some(added)) = (self.get(command), self.get(offset)) else { return true };
         value.checked_add(added).is_some_and(|sum| self.set(command, sum) && self.set(offset, 0))
     }
@@ -360,9 +352,7 @@ impl AxisCommand {
             Signal::TorqueCommand => (CommandSet::TORQUE, self.torque.0),
             Signal::PositionOffset => (CommandSet::POSITION_OFFSET, self.position_offset.0),
             Signal::VelocityOffset => (CommandSet::VELOCITY_OFFSET, self.velocity_offset.0),
-            Signal::AccelerationOffset => (CommandSet::ACCELERATION_OFFSET, self.acceleration_offset.0),
             Signal::TorqueOffset => (CommandSet::TORQUE_OFFSET, self.torque_offset.0),
-            Signal::DigitalOutputs => (CommandSet::DIGITAL_OUTPUTS, i64::from(self.digital_outputs)),
             Signal::TargetPosition => (CommandSet::TARGET_POSITION, self.target_position.0),
             Signal::ProfileVelocity => (CommandSet::PROFILE_VELOCITY, self.profile_velocity.0),
             Signal::ProfileAcceleration => (CommandSet::PROFILE_ACCELERATION, self.profile_acceleration.0),
@@ -373,7 +363,7 @@ impl AxisCommand {
     }
 
     /// Sets a command signal and marks it present. Returns `false`, and changes nothing, when the signal
-    /// belongs to the feedback or the value does not fit (digital outputs are 32 bits).
+    /// belongs to the feedback.
     #[inline]
     pub fn set(&mut self, signal: Signal, value: i64) -> bool {
         let bit = match signal {
@@ -401,18 +391,9 @@ impl AxisCommand {
                 self.velocity_offset = Velocity(value);
                 CommandSet::VELOCITY_OFFSET
             }
-            Signal::AccelerationOffset => {
-                self.acceleration_offset = Acceleration(value);
-                CommandSet::ACCELERATION_OFFSET
-            }
             Signal::TorqueOffset => {
                 self.torque_offset = Torque(value);
                 CommandSet::TORQUE_OFFSET
-            }
-            Signal::DigitalOutputs => {
-                let Ok(bits) = u32::try_from(value) else { return false };
-                self.digital_outputs = bits;
-                CommandSet::DIGITAL_OUTPUTS
             }
             Signal::TargetPosition => {
                 self.target_position = Position(value);
@@ -623,7 +604,7 @@ mod tests {
                 command.set(signal, value);
             }
             let mut expected = command;
-            if let Some((set_point, offset)) = Signal::leading(mode) {
+            if let Some((set_point, Some(offset))) = Signal::leading(mode) {
                 let sum = command.get(set_point).zip(command.get(offset)).map(|(a, b)| a + b);
                 expected.set(set_point, sum.expect("both are there"));
                 expected.set(offset, 0);
@@ -644,13 +625,13 @@ mod tests {
     }
 
     #[test]
-    fn inputs_and_outputs_refuse_more_than_32_bits() {
-        let mut command = AxisCommand::default();
-        assert!(!command.set(Signal::DigitalOutputs, 1 << 32));
-        assert!(!command.set(Signal::DigitalOutputs, -1));
-        assert_eq!(command, AxisCommand::default());
-        assert!(command.set(Signal::DigitalOutputs, 0xFFFF_FFFF));
-        assert_eq!(command.get(Signal::DigitalOutputs), Some(0xFFFF_FFFF));
+    fn inputs_refuse_more_than_32_bits() {
+        let mut feedback = AxisFeedback::default();
+        assert!(!feedback.set(Signal::DigitalInputs, 1 << 32));
+        assert!(!feedback.set(Signal::DigitalInputs, -1));
+        assert_eq!(feedback, AxisFeedback::default());
+        assert!(feedback.set(Signal::DigitalInputs, 0xFFFF_FFFF));
+        assert_eq!(feedback.get(Signal::DigitalInputs), Some(0xFFFF_FFFF));
     }
 
     #[test]

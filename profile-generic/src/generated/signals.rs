@@ -12,9 +12,7 @@ signal_rows! {
     TorqueCommand = "torque_command", Torque, Command, "Set-point of the torque or force.";
     PositionOffset = "position_offset", Position, Command, "Added to the position set-point.";
     VelocityOffset = "velocity_offset", Velocity, Command, "Added to the output of the position loop: trim and feed-forward of the velocity.";
-    AccelerationOffset = "acceleration_offset", Acceleration, Command, "Added to the output of the velocity loop: trim and feed-forward of the acceleration.";
     TorqueOffset = "torque_offset", Torque, Command, "Added to the torque set-point: trim and feed-forward of the torque.";
-    DigitalOutputs = "digital_outputs", None, Command, "Digital outputs the controller sets, bit 0 first.";
     TargetPosition = "target_position", Position, Command, "Where the drive is to go by itself.";
     ProfileVelocity = "profile_velocity", Velocity, Command, "Highest speed on the way to the target.";
     ProfileAcceleration = "profile_acceleration", Acceleration, Command, "Acceleration on the way to the target.";

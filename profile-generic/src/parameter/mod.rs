@@ -263,7 +263,7 @@ mod tests {
         let poles = Parameter::MOTOR_POLE_COUNT;
         assert_eq!(ParameterAccess::write(poles, number).check(true), Err(ParameterError::NotNow(poles)));
         assert!(ParameterAccess::write(poles, number).check(false).is_ok());
-        let actual = Parameter::POSITION_ACTUAL;
+        let actual = Parameter::LOAD_POSITION_ACTUAL;
         assert_eq!(
             ParameterAccess::write(actual, number).check(false),
             Err(ParameterError::ReadOnly(actual))

@@ -12,17 +12,30 @@ fn note(row: &GenericParameter) -> String {
 }
 
 /// Where a value is on each side.
-fn places(places: &Places) -> [Cell; 3] {
-    [&places.cip, &places.sercos, &places.cia402].map(|side| side.join(", ").as_str().into())
+fn places(places: &Places) -> [Cell; 4] {
+    let side = |side: &[String]| side.join(", ").as_str().into();
+    [side(&places.cip), places.gateway.into(), side(&places.sercos), side(&places.cia402)]
 }
 
 /// Parameters, by number, and the signals of the process image, which have none, with where each is on both sides.
 pub fn instance(mapping: &Mapping) -> Sheet {
-    const COLUMNS: &[&str] =
-        &["id", "name", "kind", "quantity", "unit", "data_type", "access", "cip", "sercos", "cia402", "note"];
+    const COLUMNS: &[&str] = &[
+        "id",
+        "name",
+        "kind",
+        "quantity",
+        "unit",
+        "data_type",
+        "access",
+        "cip",
+        "gateway",
+        "sercos",
+        "cia402",
+        "note",
+    ];
     let dictionary = &mapping.dictionaries.generic;
     let parameters = dictionary.parameters().iter().map(|row| {
-        let [cip, sercos, cia402] = places(&mapping.places_of_parameter(row.parameter));
+        let [cip, gateway, sercos, cia402] = places(&mapping.places_of_parameter(row.parameter));
         vec![
             row.parameter.0.into(),
             row.name.as_str().into(),
@@ -32,13 +45,14 @@ pub fn instance(mapping: &Mapping) -> Sheet {
             row.kind.name().into(),
             row.access.name().into(),
             cip,
+            gateway,
             sercos,
             cia402,
             note(row).as_str().into(),
         ]
     });
     let signals = dictionary.signals().iter().map(|signal| {
-        let [cip, sercos, cia402] = places(&mapping.places_of_signal(*signal));
+        let [cip, gateway, sercos, cia402] = places(&mapping.places_of_signal(*signal));
         vec![
             Cell::None,
             signal.name().into(),
@@ -48,6 +62,7 @@ pub fn instance(mapping: &Mapping) -> Sheet {
             "integer".into(),
             if signal.is_command() { "command" } else { "feedback" }.into(),
             cip,
+            gateway,
             sercos,
             cia402,
             "".into(),

@@ -37,7 +37,7 @@ impl Trims {
         lead: bool,
     ) {
         let told = command.selection();
-        let own = Signal::leading(told.mode).map(|(_, offset)| offset).filter(|_| lead);
+        let own = Signal::leading(told.mode).and_then(|(_, offset)| offset).filter(|_| lead);
         let adds = match program {
             Some(program) if lead => program.carries(told) & program.carries(shown),
             _ => CommandSet::empty(),
