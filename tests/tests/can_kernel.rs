@@ -432,7 +432,8 @@ fn telegrams_leave_at_their_instant_where_the_interface_has_etf() {
     }
     // What would be late is sent nevertheless, at once: with an instant so near that the kernel throws it away when the machine pauses.
     let come = (0..20).map(|_| {
-        near.send_at(&telegram(5), now).unwrap();
+        // It refuses one whose instant is over already.
+        let _ = near.send_at(&telegram(5), now);
         telegrams(&far, Duration::from_millis(100))
     });
     let come = come.map(|come| come.iter().map(|(last, _)| *last).collect::<Vec<_>>());

@@ -475,7 +475,7 @@ fn signals_and_limits_are_checked() {
     );
     // An attribute takes a parameter for its signal only where both measure the same.
     for (attribute, signal, rows, expected) in [
-        ("Position Error", "following_error", "parameter = \"velocity_actual\"", "turns that into velocity"),
+        ("Position Error", "following_error", "parameter = \"velocity_error\"", "turns that into velocity"),
         (
             "Torque Command",
             "torque_command",

@@ -69,6 +69,8 @@ parameter_rows! {
     MOTOR_TURNS_PER_UNIT = 0x0609, "motor_turns_per_unit", BasicDrive, None, Integer, Read,
         "Revolutions of the motor in one axis unit, in 1e-9; the gateway computes it from gear and feed.";
 
+    MOTOR_NAME = 0x0702, "motor_name", BasicDrive, None, Text, Read,
+        "Type designation of the motor.";
     MOTOR_RATED_TORQUE = 0x0704, "motor_rated_torque", BasicDrive, TorqueAbsolute, Integer, WriteWhileDisabled,
         "Rated torque or force: the whole that torque is told in parts of.";
     MOTOR_RATED_CURRENT = 0x0706, "motor_rated_current", BasicDrive, Current, Integer, WriteWhileDisabled,
@@ -157,6 +159,8 @@ parameter_rows! {
         "Voltage of the DC bus.";
     BUS_NOMINAL_VOLTAGE = 0x0A02, "bus_nominal_voltage", BasicDrive, Voltage, Integer, WriteWhileDisabled,
         "Nominal voltage of the DC bus.";
+    POWER_LOSS_ACTION = 0x0A06, "power_loss_action", BasicDrive, None, Integer, Write,
+        "What to do when the DC bus loses its power.";
     MOTOR_TEMPERATURE = 0x0A08, "motor_temperature", BasicDrive, Temperature, Integer, Read,
         "Temperature of the motor.";
     DRIVE_TEMPERATURE = 0x0A09, "drive_temperature", BasicDrive, Temperature, Integer, Read,
