@@ -10,6 +10,7 @@ pub mod doctor;
 pub mod eds;
 pub mod engine;
 pub mod host;
+pub mod http;
 pub mod latest;
 pub mod local;
 pub mod log_limit;

@@ -158,6 +158,9 @@ fn axes(out: &mut String, axes: &[Axis], paint: &dyn Fn(&str, bool) -> String) {
                 format!(", the drive says {:#06X}", axis.drive_code)
             };
             let _ = writeln!(out, "{indent}  {}", paint(&format!("fault {fault}{code}"), false));
+            if let Some(advice) = &axis.advice {
+                let _ = writeln!(out, "{indent}  {advice}");
+            }
         }
         if let Some(waits) = &axis.waits {
             let _ = writeln!(out, "{indent}  {waits}");
@@ -188,20 +191,28 @@ mod tests {
     fn axis(name: &str, unit: &str) -> Axis {
         Axis {
             name: name.to_owned(),
+            bus: "SERCOS".to_owned(),
+            drive: "drive-a".to_owned(),
+            device: Some("front".to_owned()),
             state: "operating".to_owned(),
             cip_state: Some("Running".to_owned()),
             owner: "controller".to_owned(),
             mode: "position".to_owned(),
+            drive_status: vec!["ready".to_owned()],
+            axis_status: "solid green".to_owned(),
+            display: "RUNNING".to_owned(),
             unit: unit.to_owned(),
             position: 12.345_678,
             velocity: -0.5,
             torque: 1.8,
             following_error: 0.000_12,
             fault: None,
+            advice: None,
             drive_code: 0,
             waits: None,
             inhibits: Vec::new(),
             lost_telegrams: 0,
+            faults: 0,
         }
     }
 
@@ -210,6 +221,7 @@ mod tests {
             state: "faulted".to_owned(),
             cip_state: None,
             fault: Some("over_current".to_owned()),
+            advice: Some("Check the supply.".to_owned()),
             drive_code: 0x2310,
             waits: Some("has waited 12 s for power".to_owned()),
             inhibits: vec!["no_power".to_owned(), "no_drive".to_owned()],
@@ -219,6 +231,7 @@ mod tests {
         Overview {
             format: FORMAT,
             name: "cell 4".to_owned(),
+            version: "0.1.0".to_owned(),
             state: "running".to_owned(),
             sercos_phase: Some(4),
             connections: 1,
@@ -246,6 +259,8 @@ mod tests {
                 threshold_ns: 10_000,
                 steps: 1,
             },
+            devices: Vec::new(),
+            buses: Vec::new(),
             axes: vec![axis("turntable", "rev"), faulted],
         }
     }

@@ -26,6 +26,8 @@ pub struct File {
     pub log: Option<LogTable>,
     /// The Modbus TCP server. Default: none.
     pub modbus: Option<ModbusTable>,
+    /// The HTTP server with the state of the gateway. Default: none.
+    pub http: Option<HttpTable>,
     /// Mapping tables. Default: the built-in ones.
     pub mappings: Option<MappingsTable>,
     /// The CIP Motion devices seen by controllers, at least one.
@@ -128,6 +130,19 @@ pub struct ModbusParameterTable {
     /// Whether clients may write it while nobody controls the axis. Default: false.
     #[serde(default)]
     pub write: bool,
+}
+
+/// `[http]`
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HttpTable {
+    /// Address and port, such as `"127.0.0.1:8080"`.
+    #[schemars(transform = form::socket_address)]
+    pub listen: Spanned<String>,
+    /// Connections that can be open at the same time, 8 to 256; a page that is looked at holds one, and pages at most half of them.
+    /// Default: 64.
+    #[schemars(range(min = 8, max = 256))]
+    pub connections_max: Option<Spanned<i64>>,
 }
 
 /// `[mappings]`

@@ -62,6 +62,8 @@ pub struct Config {
     pub log_level: LogLevel,
     /// The Modbus TCP server; `None` for none.
     pub modbus: Option<Modbus>,
+    /// The HTTP server; `None` for none.
+    pub http: Option<Http>,
     /// A folder of mapping tables in place of the built-in ones.
     pub mappings_dir: Option<PathBuf>,
     /// What is laid over the tables, files and folders, in this order.
@@ -330,6 +332,15 @@ pub struct Modbus {
     pub clients_max: u8,
     /// Registers that are parameters of drives.
     pub parameters: Vec<ModbusParameter>,
+}
+
+/// The HTTP server.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Http {
+    /// Where it listens.
+    pub listen: SocketAddr,
+    /// Connections open at once, 8 to 256.
+    pub connections_max: u16,
 }
 
 /// Registers that are a parameter of a drive.

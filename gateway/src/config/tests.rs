@@ -66,8 +66,8 @@ fn defaults_are_those_of_the_documentation() {
     let config = good();
     assert_eq!(config.name, "press");
     assert_eq!(
-        (&config.time, config.log_level, config.modbus.clone()),
-        (&Time::default(), LogLevel::Info, None)
+        (&config.time, config.log_level, config.modbus.clone(), config.http),
+        (&Time::default(), LogLevel::Info, None, None)
     );
     assert_eq!((&config.mappings_dir, &config.settings_file, config.overlays.len()), (&None, &None, 0));
     let device = &config.devices[0];
@@ -158,7 +158,7 @@ fn defaults_are_those_of_the_documentation() {
 #[test]
 fn values_given_are_taken() {
     let text = GOOD
-        .replace("[[device]]", "[time]\nsource = \"host\"\n[log]\nlevel = \"debug\"\n[modbus]\nlisten = \"[::1]:502\"\nclients_max = 3\n[mappings]\ndir = \"maps\"\noverlays = [\"own.toml\"]\n[[device]]")
+        .replace("[[device]]", "[time]\nsource = \"host\"\n[log]\nlevel = \"debug\"\n[modbus]\nlisten = \"[::1]:502\"\nclients_max = 3\n[http]\nlisten = \"[::1]:80\"\nconnections_max = 256\n[mappings]\ndir = \"maps\"\noverlays = [\"own.toml\"]\n[[device]]")
         .replace("serial_number = 3", "serial_number = 0xFFFF_FFFF\nrevision = \"127.255\"\nproduct_name = \"P\"")
         .replace("axes = [\"x\", \"y\"]", "axes = [\"x\", \"y\"]\npower_structure_class_id = 7\nupdate_period = { min = \"4 ms\", max = \"4 ms\" }")
         .replace("unit = \"revolution\"", "unit = \"revolution\"\nmotion_resolution = 4096\nunwind_counts = 8192\npower_structure_axis_id = 9\non_command_loss = \"disable-and-coast\"\nlimits = { velocity = 12.5, acceleration = 100, torque_percent = 150.5, following_error = 0.1 }")
@@ -171,6 +171,7 @@ fn values_given_are_taken() {
         config.modbus,
         Some(Modbus { listen: "[::1]:502".parse().unwrap(), clients_max: 3, parameters: Vec::new() })
     );
+    assert_eq!(config.http, Some(Http { listen: "[::1]:80".parse().unwrap(), connections_max: 256 }));
     assert_eq!(config.mappings_dir.as_deref(), Some(Path::new("maps")));
     let device = &config.devices[0];
     assert_eq!(device.listen, Ipv4Addr::new(192, 0, 2, 10));
@@ -502,7 +503,7 @@ fn the_reference_describes_every_key() {
         // The tables of the top level stand in their headings, without a row of their own.
         let shown = match key {
             "the_box" => "`[box]`".to_owned(),
-            "time" | "log" | "modbus" | "mappings" => format!("`[{key}]`"),
+            "time" | "log" | "modbus" | "http" | "mappings" => format!("`[{key}]`"),
             "device" | "axis" => format!("`[[{key}]]`"),
             "south" => "`[south]`".to_owned(),
             key => format!("`{key}`"),

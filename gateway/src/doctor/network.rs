@@ -70,6 +70,9 @@ pub(super) fn checks(root: &Path, config: Option<&Config>) -> Vec<Check> {
     if let Some(modbus) = &config.modbus {
         checks.push(address("Modbus", modbus.listen));
     }
+    if let Some(http) = &config.http {
+        checks.push(address("HTTP", http.listen));
+    }
     checks
 }
 

@@ -12,7 +12,7 @@ use super::device::DeviceChannel;
 use super::phase_lock::{Phase, PhaseLock};
 use crate::latest::Publisher;
 use crate::mapping::CipProgram;
-use crate::status::{AxisStatus, BoxState, BoxStatus, Indicators, PHASE_NONE};
+use crate::status::{AxisStatus, BoxState, BoxStatus, BusStatus, Controller, Indicators, PHASE_NONE};
 
 /// Longest age of the published status while no state changes.
 const PUBLISH_PERIOD: DurationNs = DurationNs::from_millis(10);
@@ -120,10 +120,22 @@ impl Publication {
         status.phase_lock = worst(&sources.locks[..sources.buses.len().min(sources.locks.len())]);
         let counters = &mut status.counters;
         (counters.cycles, counters.lost_telegrams, counters.refused_frames) = (0, 0, 0);
-        for counts in sources.buses.iter().map(South::counts) {
+        status.bus_count = u8::try_from(sources.buses.len()).unwrap_or(u8::MAX);
+        for (place, bus) in sources.buses.iter().enumerate() {
+            let counts = bus.counts();
             counters.cycles += counts.cycles;
             counters.lost_telegrams += counts.lost;
             counters.refused_frames += counts.refused;
+            if let Some(entry) = status.buses.get_mut(place) {
+                *entry = BusStatus {
+                    up: bus.is_up(),
+                    phase: bus.phase().unwrap_or(PHASE_NONE),
+                    cycle_time_ns: u32::try_from(bus.cycle_time().as_nanos()).unwrap_or(u32::MAX),
+                    cycles: counts.cycles,
+                    lost_telegrams: counts.lost,
+                    refused_frames: counts.refused,
+                };
+            }
         }
         counters.lost_updates = 0;
         for channel in sources.devices {
@@ -134,6 +146,9 @@ impl Publication {
             // Each of them looks at all axes of the device.
             let (node, module) = (device.node_condition(), device.module_state());
             let network = channel.network_status();
+            let controller = device
+                .connection()
+                .map(|open| Controller { address: open.originator, update_period_us: open.rpi_us });
             for (place, (number, state)) in channel.axis_states().enumerate() {
                 if let (Some(entry), Some(axis)) = (status.axes.get_mut(number), sources.axes.get(number)) {
                     of_axis(entry, axis);
@@ -146,6 +161,7 @@ impl Publication {
                         several: entry.indicators.several,
                         minor_fault: shown.is_some_and(|axis| axis.minor_fault),
                     };
+                    entry.controller = controller;
                     entry.lost_updates = u32::try_from(lost_updates).unwrap_or(u32::MAX);
                     let counts =
                         |program: &CipProgram| low_word(program.counts(axis.feedback().position.get()).value);

@@ -1,12 +1,16 @@
 //! The state of the whole gateway as one JSON object: the reply to `box`, and what `axisbridge status` shows.
 
+use profile_cip::device::visualization;
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::cast::f64_from_i64;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::advice::advice;
+use super::installation::{Installation, NamedBus, NamedDevice};
 use super::protocol::unit;
-use crate::config::{AxisKind, TimeSource};
-use crate::status::{AxisStatus, BoxState, BoxStatus, PHASE_NONE};
+use crate::config::TimeSource;
+use crate::status::{AxisStatus, BoxState, BoxStatus, BusStatus, Controller, PHASE_NONE};
 use crate::time::status::{Identity, TimeStatus};
 
 /// Version of the object. It changes when a field gets another meaning, not when one is added.
@@ -19,12 +23,15 @@ const NANO: f64 = 1e9;
 const PARTS_PER_PERCENT: f64 = 10_000.0;
 
 /// A running gateway.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Overview {
     /// [`FORMAT`].
     pub format: u32,
     /// Its name in the configuration.
     pub name: String,
+    /// Version of Axisbridge; empty if it is older than this field.
+    #[serde(default)]
+    pub version: String,
     /// `starting`, `phase_up`, `ready`, `running`, `bus_lost` or `stopping`.
     pub state: String,
     /// Communication phase of the SERCOS bus, where there is one.
@@ -37,12 +44,18 @@ pub struct Overview {
     pub cycles: Cycles,
     /// System time.
     pub time: Time,
+    /// The CIP Motion devices in the order of the configuration.
+    #[serde(default)]
+    pub devices: Vec<Device>,
+    /// The SERCOS bus, the CANopen buses, the DeviceNet networks.
+    #[serde(default)]
+    pub buses: Vec<Bus>,
     /// The axes in the order of the configuration.
     pub axes: Vec<Axis>,
 }
 
 /// How the cycles go: counters since the start.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Cycles {
     /// Shortest cycle of all buses.
     pub cycle_ns: u32,
@@ -67,7 +80,7 @@ pub struct Cycles {
 }
 
 /// System time.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Time {
     /// The `source` of the configuration.
     pub source: String,
@@ -89,11 +102,60 @@ pub struct Time {
     pub steps: u32,
 }
 
+/// A CIP Motion device, as controllers see it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Device {
+    /// Its name.
+    pub name: String,
+    /// The address of the gateway that it listens on.
+    pub address: String,
+    /// Address of the controller that is connected.
+    pub controller: Option<String>,
+    /// Controller Update Period of the connection.
+    pub update_period_us: Option<u32>,
+    /// Module Status indicator, such as `solid green`.
+    pub module_status: String,
+    /// Network Status indicator, such as `solid green`.
+    pub network_status: String,
+    /// Updates of controllers that were lost or late.
+    pub lost_updates: u32,
+}
+
+/// A bus.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Bus {
+    /// Its name, as the log has it: `SERCOS`, `CAN bus 1`, `DeviceNet 1`.
+    pub name: String,
+    /// Its interface, two for a ring, or `in-process`.
+    pub interface: String,
+    /// Whether every drive that answers is in cyclic operation.
+    pub up: bool,
+    /// SERCOS communication phase, 0 to 4.
+    pub phase: Option<u8>,
+    /// Its cycle.
+    pub cycle_ns: u32,
+    /// Cycles.
+    pub cycles: u64,
+    /// Telegrams of drives that were not received in time.
+    pub lost_telegrams: u64,
+    /// Frames that were received and refused.
+    pub refused_frames: u64,
+}
+
 /// An axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Axis {
     /// Its name.
     pub name: String,
+    /// Its bus, by the name in `buses`.
+    #[serde(default)]
+    pub bus: String,
+    /// Its drive.
+    #[serde(default)]
+    pub drive: String,
+    /// Its device, where it is on one.
+    #[serde(default)]
+    pub device: Option<String>,
     /// State in the generic drive model.
     pub state: String,
     /// State that the controller sees (Axis State), where the axis is on a device.
@@ -102,6 +164,15 @@ pub struct Axis {
     pub owner: String,
     /// Operating mode that the drive shows.
     pub mode: String,
+    /// What the drive reports: the status bits that are set, such as `ready`, `power`, `enabled`.
+    #[serde(default)]
+    pub drive_status: Vec<String>,
+    /// Axis Status indicator, such as `solid green`.
+    #[serde(default)]
+    pub axis_status: String,
+    /// What the display of a CIP Motion drive would show.
+    #[serde(default)]
+    pub display: String,
     /// `rev` or `mm`.
     pub unit: String,
     /// Actual position, in the unit.
@@ -114,6 +185,9 @@ pub struct Axis {
     pub following_error: f64,
     /// The fault that stands.
     pub fault: Option<String>,
+    /// What to do about it.
+    #[serde(default)]
+    pub advice: Option<String>,
     /// The drive's own code of it; 0 if it has reported none.
     pub drive_code: u32,
     /// What the axis has waited for, for longer than a second, in words.
@@ -122,30 +196,23 @@ pub struct Axis {
     pub inhibits: Vec<String>,
     /// Bus cycles without fresh data from the drive.
     pub lost_telegrams: u32,
-}
-
-/// What does not change while the gateway runs.
-#[derive(Debug, Clone, Copy)]
-pub struct Known<'a> {
-    /// Name of the gateway.
-    pub name: &'a str,
-    /// Names of the axes.
-    pub names: &'a [String],
-    /// Rotary or linear.
-    pub kinds: &'a [AxisKind],
-    /// Source of system time.
-    pub source: TimeSource,
+    /// Faults that have occurred.
+    #[serde(default)]
+    pub faults: u32,
 }
 
 impl Overview {
     /// The overview of a status.
     #[must_use]
-    pub fn of(known: &Known<'_>, status: &BoxStatus, time: &TimeStatus) -> Self {
+    pub fn of(known: &Installation, status: &BoxStatus, time: &TimeStatus) -> Self {
         let counters = &status.counters;
-        let axes = status.configured_axes().iter().zip(known.names.iter().zip(known.kinds));
+        let axes = status.configured_axes().iter().take(known.axes.len()).enumerate();
+        let devices = known.devices.iter().enumerate();
+        let buses = known.buses.iter().zip(status.configured_buses());
         Self {
             format: FORMAT,
-            name: known.name.to_owned(),
+            name: known.name.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
             state: status.state.to_string(),
             sercos_phase: Some(status.phase).filter(|phase| *phase != PHASE_NONE),
             connections: status.connections,
@@ -163,7 +230,9 @@ impl Overview {
                 send_failures: counters.send_failures,
             },
             time: Time::of(known.source, time),
-            axes: axes.map(|(axis, (name, kind))| Axis::of(name, *kind, axis)).collect(),
+            devices: devices.map(|(number, device)| Device::of(number, device, status)).collect(),
+            buses: buses.map(|(bus, status)| Bus::of(bus, status)).collect(),
+            axes: axes.map(|(number, axis)| Axis::of(known, number, axis)).collect(),
         }
     }
 
@@ -198,31 +267,79 @@ impl Time {
     }
 }
 
-impl Axis {
-    fn of(name: &str, kind: AxisKind, axis: &AxisStatus) -> Self {
-        let units = |nano: i64| f64_from_i64(nano) / NANO;
+impl Device {
+    fn of(number: usize, device: &NamedDevice, status: &BoxStatus) -> Self {
+        // Every axis of a device shows the state of the device alike.
+        let axis = status.configured_axes().iter().find(|axis| usize::from(axis.device) == number);
+        let axis = axis.unwrap_or(&AxisStatus::NONE);
+        let controller = axis.controller;
         Self {
-            name: name.to_owned(),
+            name: device.name.clone(),
+            address: device.address.to_string(),
+            controller: controller.map(|Controller { address, .. }| address.to_string()),
+            update_period_us: controller.map(|controller| controller.update_period_us),
+            module_status: visualization::module_status(axis.indicators.module).to_string(),
+            network_status: axis.indicators.network.to_string(),
+            lost_updates: axis.lost_updates,
+        }
+    }
+}
+
+impl Bus {
+    fn of(bus: &NamedBus, status: &BusStatus) -> Self {
+        Self {
+            name: bus.name.clone(),
+            interface: bus.interface.clone(),
+            up: status.up,
+            phase: Some(status.phase).filter(|phase| *phase != PHASE_NONE),
+            cycle_ns: status.cycle_time_ns,
+            cycles: status.cycles,
+            lost_telegrams: status.lost_telegrams,
+            refused_frames: status.refused_frames,
+        }
+    }
+}
+
+impl Axis {
+    fn of(known: &Installation, number: usize, axis: &AxisStatus) -> Self {
+        let units = |nano: i64| f64_from_i64(nano) / NANO;
+        let named = &known.axes[number];
+        let device = known.devices.get(usize::from(axis.device)).filter(|_| axis.instance != 0);
+        Self {
+            name: named.name.clone(),
+            bus: known.bus_of(number).map(|bus| bus.name.clone()).unwrap_or_default(),
+            drive: named.drive.clone(),
+            device: device.map(|device| device.name.clone()),
             state: axis.state.to_string(),
             cip_state: (axis.instance != 0).then(|| AxisStateCode(axis.cip_axis_state).to_string()),
             owner: axis.owner.name().to_owned(),
             mode: axis.mode.to_string(),
-            unit: unit(kind).to_owned(),
+            drive_status: lower_case(axis.status.iter_names().map(|(name, _)| name)),
+            axis_status: axis.indicators.axis.to_string(),
+            display: axis.display().to_string(),
+            unit: unit(named.kind).to_owned(),
             position: units(axis.position.get()),
             velocity: units(axis.velocity.get()),
             torque: f64_from_i64(axis.torque.get()) / PARTS_PER_PERCENT,
             following_error: units(axis.following_error.get()),
             fault: axis.fault.map(|fault| fault.to_string()),
+            advice: axis.fault.map(|fault| advice(fault).to_owned()),
             drive_code: axis.fault_vendor_code,
             waits: axis.wait.map(|wait| wait.to_string()),
-            inhibits: axis.inhibits.iter_names().map(|(name, _)| name.to_ascii_lowercase()).collect(),
+            inhibits: lower_case(axis.inhibits.iter_names().map(|(name, _)| name)),
             lost_telegrams: axis.lost_telegrams,
+            faults: axis.faults,
         }
     }
 }
 
+fn lower_case<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    names.map(str::to_ascii_lowercase).collect()
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::installation::tests::installation;
     use super::*;
     use crate::status::tests::distinct;
     use crate::time::judge::{Reason, SyncPhase};
@@ -239,19 +356,14 @@ mod tests {
             error_bound: 800,
             ..TimeStatus::ptp(&follower)
         };
-        let names = ["turntable", "slide"].map(str::to_owned);
-        let known = Known {
-            name: "cell 4",
-            names: &names,
-            kinds: &[AxisKind::Rotary, AxisKind::Linear],
-            source: TimeSource::Ptp,
-        };
-        Overview::of(&known, &distinct(), &time)
+        Overview::of(&installation(), &distinct(), &time)
     }
 
     #[test]
     fn every_value_is_in_the_object() {
-        insta::assert_snapshot!(serde_json::to_string_pretty(&overview()).unwrap());
+        // The version changes with each release.
+        let overview = Overview { version: "VERSION".to_owned(), ..overview() };
+        insta::assert_snapshot!(serde_json::to_string_pretty(&overview).unwrap());
     }
 
     #[test]

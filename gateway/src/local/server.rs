@@ -20,9 +20,10 @@ use tokio::sync::mpsc;
 use tracing::{info, warn};
 
 use super::drive::job::{Ask, Context, Job, Step};
-use super::overview::{Known, Overview};
+use super::installation::Installation;
+use super::overview::Overview;
 use super::protocol::{self, BadRequest, LINE_MAX, NamedParameter};
-use crate::config::{AxisKind, TimeSource};
+use crate::config::AxisKind;
 use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
 use crate::latest::Reader;
@@ -58,10 +59,8 @@ pub struct Shared {
     pub catalogue: Catalogue,
     /// The status of the gateway.
     pub status: Reader<BoxStatus>,
-    /// Its name in the configuration.
-    pub name: String,
-    /// Where system time comes from.
-    pub source: TimeSource,
+    /// Its parts by name.
+    pub installation: Installation,
     /// System time.
     pub time: TimeView,
 }
@@ -69,8 +68,7 @@ pub struct Shared {
 impl Shared {
     /// The whole gateway, as the reply to `box`.
     fn overview(&self) -> String {
-        let known = Known { name: &self.name, names: &self.names, kinds: &self.kinds, source: self.source };
-        let overview = Overview::of(&known, &self.status.read(), &self.time.read());
+        let overview = Overview::of(&self.installation, &self.status.read(), &self.time.read());
         // The object has texts, numbers and lists, and nothing that JSON does not know.
         let json = serde_json::to_string(&overview).unwrap_or_default();
         format!("ok box {json}\n")
@@ -468,7 +466,9 @@ mod tests {
     use profile_sercos::wire::svc::Element;
     use tokio::io::{AsyncBufReadExt as _, BufReader};
 
+    use super::super::installation::NamedAxis;
     use super::*;
+    use crate::config::TimeSource;
     use crate::engine::direct::{DirectFailure, Direction, Target};
     use crate::engine::local::Failure;
     use crate::engine::parameter::ParameterFailure;
@@ -492,6 +492,10 @@ mod tests {
     type Ends = (ClientEnd, DirectEnd);
     type Direct = (rtrb::Consumer<DirectRequest>, rtrb::Producer<DirectAnswer>);
 
+    fn named((name, kind): (&str, AxisKind)) -> NamedAxis {
+        NamedAxis { name: name.to_owned(), kind, bus: 0, drive: format!("drive-{name}") }
+    }
+
     fn shared() -> Shared {
         let (publisher, status) = latest(distinct());
         drop(publisher);
@@ -512,8 +516,13 @@ mod tests {
             parameters: vec![code],
             catalogue: Catalogue::new(vec![Bus::Sercos, Bus::Devicenet], &Mapping::embedded().unwrap()),
             status,
-            name: "cell".to_owned(),
-            source: TimeSource::Ptp,
+            installation: Installation {
+                name: "cell".to_owned(),
+                source: TimeSource::Ptp,
+                devices: Vec::new(),
+                buses: Vec::new(),
+                axes: [("x", AxisKind::Rotary), ("y", AxisKind::Linear)].map(named).to_vec(),
+            },
             time: TimeView::of(TimeStatus::ptp(&follower)),
         }
     }

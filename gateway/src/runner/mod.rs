@@ -3,6 +3,7 @@
 //! ```text
 //! cycle thread:  UDP 2222, SERCOS interface, engine
 //! tokio:         TCP and UDP 44818, Modbus TCP, log of the engine's notices
+//! HTTP thread:   health, metrics, status, page
 //! ```
 
 mod can_watch;
@@ -35,7 +36,7 @@ use self::port::{CanSocketPort, OpenPort, PacketPort, PortError, UdpPort};
 use self::strangers::DropWatch;
 use crate::capture::can_bus::CanProtocol;
 use crate::capture::recorder::{Recorder, Settings, Tap};
-use crate::config::{AxisKind, CanLink, Config, Link, ModbusParameter};
+use crate::config::{AxisKind, CanLink, Config, Http, Link, ModbusParameter};
 use crate::engine::Engine;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
@@ -45,7 +46,9 @@ use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::CanPort;
 use crate::engine::registers::RegisterNorth;
 use crate::host::HostPort;
+use crate::http::{HttpServer, RunningServer, View};
 use crate::latest::Reader;
+use crate::local::installation::Installation;
 use crate::local::protocol::NamedParameter;
 use crate::local::{LocalServer, Shared, SocketFile};
 use crate::mapping::Mapping;
@@ -121,6 +124,14 @@ pub enum StartError {
         /// What the system said.
         source: io::Error,
     },
+    /// The HTTP port is not to be had.
+    #[error("cannot listen on {address} for HTTP: {source}")]
+    Http {
+        /// The address.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
     /// The recording cannot be written.
     #[error("cannot write the recording {path}: {source}")]
     Recording {
@@ -164,6 +175,8 @@ pub struct RunningBox {
     axes: Vec<(String, AxisKind)>,
     /// Where system time comes from.
     time: TimeService,
+    /// The HTTP server; it ends when this is dropped.
+    http: Option<RunningServer>,
     /// The socket of local control, removed at the end.
     _socket: Option<SocketFile>,
 }
@@ -313,6 +326,7 @@ pub fn start(
             }
         });
     }
+    let http = config.http.map(|http| serve_http(http, config, &status, &time)).transpose()?;
     let socket = extras
         .local
         .map(|path| serve_local((path, config), &mut engine, &status, time.view(), &runtime))
@@ -341,8 +355,26 @@ pub fn start(
         restart,
         axes,
         time,
+        http,
         _socket: socket,
     })
+}
+
+/// Lets the HTTP server show the state.
+fn serve_http(
+    http: Http,
+    config: &Config,
+    status: &Reader<BoxStatus>,
+    time: &TimeService,
+) -> Result<RunningServer, StartError> {
+    let failed = |source| StartError::Http { address: http.listen, source };
+    let server = HttpServer::bind(http.listen, http.connections_max).map_err(failed)?;
+    let address = server.local_address().map_err(failed)?;
+    let view = View::new(Installation::of(config), status.clone(), time.view(), WallClock::now());
+    let running =
+        server.start(view).map_err(|source| StartError::Thread { what: "the HTTP server", source })?;
+    info!(%address, "HTTP");
+    Ok(running)
 }
 
 /// The registers that are parameters of drives, served by the engine.
@@ -385,8 +417,7 @@ fn serve_local(
         parameters: NamedParameter::of(engine.mapping()),
         catalogue: Catalogue::of(config, engine.mapping()),
         status: status.clone(),
-        name: config.name.clone(),
-        source: config.time.source,
+        installation: Installation::of(config),
         time,
     };
     let (direct, accesses) = DirectNorth::new();
@@ -606,6 +637,8 @@ impl RunningBox {
             }
             tokio::time::sleep(2 * NOTICE_INTERVAL).await;
         });
+        // Viewers see the stop until here.
+        drop(self.http);
         self.runtime.shutdown_timeout(Duration::from_secs(1));
         let summary = self.recorder.map(Recorder::finish).transpose()?;
         Ok(Stopped { dropped: summary.map(|summary| summary.dropped), unrested })

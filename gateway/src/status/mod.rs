@@ -1,6 +1,9 @@
 //! The state of the box as its servers show it: one fixed-size value, published by the cycle thread.
 
+mod bus;
 mod wait;
+
+use std::net::Ipv4Addr;
 
 use profile_cip::device::identity::ModuleState;
 use profile_cip::device::visualization::Indication;
@@ -14,8 +17,10 @@ use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 
+pub use self::bus::{BUSES_MAX, BusStatus};
 pub use self::wait::AxisWait;
 
+use self::bus::BUS_WORDS;
 use self::wait::WAIT_WORDS;
 use crate::config::AXES_MAX;
 use crate::engine::axis::Owner;
@@ -26,12 +31,12 @@ use crate::latest::Words;
 const OWNERS: [Owner; 3] = [Owner::Nobody, Owner::Controller, Owner::Local];
 
 /// Words of one axis in the published form.
-const AXIS_WORDS: usize = 11 + WAIT_WORDS;
+const AXIS_WORDS: usize = 12 + WAIT_WORDS;
 
 /// Words of the box itself.
 const BOX_WORDS: usize = 10;
 
-const WORDS: usize = BOX_WORDS + AXES_MAX * AXIS_WORDS;
+const WORDS: usize = BOX_WORDS + BUSES_MAX * BUS_WORDS + AXES_MAX * AXIS_WORDS;
 
 open_code! {
     /// State of the whole gateway.
@@ -118,6 +123,28 @@ pub struct AxisStatus {
     pub faults: u32,
     /// What the indicators show for the axis and its device.
     pub indicators: Indicators,
+    /// The controller that is connected to its device.
+    pub controller: Option<Controller>,
+}
+
+/// A controller with an open CIP Motion connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Controller {
+    /// The address that its updates come from; never 0.0.0.0.
+    pub address: Ipv4Addr,
+    /// Controller Update Period, microseconds.
+    pub update_period_us: u32,
+}
+
+impl Controller {
+    fn to_word(controller: Option<Self>) -> u64 {
+        controller.map_or(0, |controller| pair(controller.address.to_bits(), controller.update_period_us))
+    }
+
+    fn from_word(word: u64) -> Option<Self> {
+        let (address, update_period_us) = split(word);
+        (address != 0).then_some(Self { address: Ipv4Addr::from_bits(address), update_period_us })
+    }
 }
 
 /// What the indicators of CIP Motion devices show (Volume 9 clause 9-1.1) for one axis and its device.
@@ -205,6 +232,7 @@ impl AxisStatus {
         saturated: 0,
         faults: 0,
         indicators: Indicators::NONE,
+        controller: None,
     };
 }
 
@@ -217,6 +245,8 @@ pub struct BoxStatus {
     pub phase: u8,
     /// CIP Motion connections open.
     pub connections: u8,
+    /// Buses; the rest of `buses` is [`BusStatus::NONE`].
+    pub bus_count: u8,
     /// Axes configured; the rest of `axes` is [`AxisStatus::NONE`].
     pub axis_count: u8,
     /// Shortest cycle of all buses, ns.
@@ -229,6 +259,8 @@ pub struct BoxStatus {
     pub phase_lock: Phase,
     /// Counters since the start.
     pub counters: Counters,
+    /// The buses: the SERCOS bus, the CANopen buses, the DeviceNet networks.
+    pub buses: [BusStatus; BUSES_MAX],
     /// The axes in the order of the configuration.
     pub axes: [AxisStatus; AXES_MAX],
 }
@@ -239,6 +271,7 @@ impl BoxStatus {
         state: BoxState::STARTING,
         phase: PHASE_NONE,
         connections: 0,
+        bus_count: 0,
         axis_count: 0,
         cycle_time_ns: 0,
         lateness_max_ns: 0,
@@ -252,8 +285,15 @@ impl BoxStatus {
             refused_frames: 0,
             send_failures: 0,
         },
+        buses: [BusStatus::NONE; BUSES_MAX],
         axes: [AxisStatus::NONE; AXES_MAX],
     };
+
+    /// The buses of the configuration, without the unused rest of the array.
+    #[must_use]
+    pub fn configured_buses(&self) -> &[BusStatus] {
+        self.buses.get(..usize::from(self.bus_count)).unwrap_or(&self.buses)
+    }
 
     /// The axes of the configuration, without the unused rest of the array.
     #[must_use]
@@ -329,6 +369,7 @@ impl AxisStatus {
             pair(self.lost_updates, self.lost_telegrams),
             pair(self.saturated, self.faults),
             self.indicators.to_word(),
+            Controller::to_word(self.controller),
             wait_0,
             wait_1,
             wait_2,
@@ -348,6 +389,7 @@ impl AxisStatus {
             lost,
             other,
             indicators,
+            controller,
             wait @ ..,
         ] = *words;
         let [instance, device, state, cip_axis_state, mode, flags, cause_high, cause_low] =
@@ -381,6 +423,7 @@ impl AxisStatus {
             saturated,
             faults,
             indicators: Indicators::from_word(indicators),
+            controller: Controller::from_word(controller),
         }
     }
 }
@@ -397,7 +440,7 @@ impl Words for BoxStatus {
             self.connections,
             self.axis_count,
             self.phase_lock.state.code(),
-            0,
+            self.bus_count,
             0,
             0,
         ];
@@ -415,17 +458,27 @@ impl Words for BoxStatus {
         ];
         let (front, rest) = words.split_at_mut(BOX_WORDS);
         front.copy_from_slice(&of_box);
+        let buses = self.configured_buses();
+        let (middle, rest) = rest.split_at_mut(buses.len() * BUS_WORDS);
+        for (place, bus) in middle.as_chunks_mut::<BUS_WORDS>().0.iter_mut().zip(buses) {
+            *place = bus.to_words();
+        }
         let axes = self.configured_axes();
         for (place, axis) in rest.as_chunks_mut::<AXIS_WORDS>().0.iter_mut().zip(axes) {
             *place = axis.to_words();
         }
-        BOX_WORDS + axes.len() * AXIS_WORDS
+        BOX_WORDS + buses.len() * BUS_WORDS + axes.len() * AXIS_WORDS
     }
 
     fn from_words(words: &Self::Array) -> Self {
         let (front, rest) = words.split_at(BOX_WORDS);
-        let [state, phase, connections, axis_count, lock, ..] = front[0].to_be_bytes();
+        let [state, phase, connections, axis_count, lock, bus_count, ..] = front[0].to_be_bytes();
         let (cycle_time_ns, lateness_max_ns) = split(front[1]);
+        let mut buses = [BusStatus::NONE; BUSES_MAX];
+        let (middle, rest) = rest.split_at(usize::from(bus_count).min(BUSES_MAX) * BUS_WORDS);
+        for (bus, place) in buses.iter_mut().zip(middle.as_chunks::<BUS_WORDS>().0) {
+            *bus = BusStatus::from_words(place);
+        }
         let mut axes = [AxisStatus::NONE; AXES_MAX];
         let configured = rest.as_chunks::<AXIS_WORDS>().0.iter().take(usize::from(axis_count));
         for (axis, place) in axes.iter_mut().zip(configured) {
@@ -435,6 +488,7 @@ impl Words for BoxStatus {
             state: BoxState(state),
             phase,
             connections,
+            bus_count,
             axis_count,
             cycle_time_ns,
             lateness_max_ns,
@@ -451,6 +505,7 @@ impl Words for BoxStatus {
                 refused_frames: front[7],
                 send_failures: front[8],
             },
+            buses,
             axes,
         }
     }
@@ -471,6 +526,7 @@ pub(crate) mod tests {
             state: BoxState::RUNNING,
             phase: 4,
             connections: 2,
+            bus_count: 2,
             axis_count: 2,
             cycle_time_ns: 2_000_000,
             lateness_max_ns: 123_456,
@@ -485,6 +541,22 @@ pub(crate) mod tests {
                 send_failures: 15,
             },
             ..BoxStatus::STARTING
+        };
+        status.buses[0] = BusStatus {
+            up: true,
+            phase: 4,
+            cycle_time_ns: 2_000_001,
+            cycles: 0x0102_0304_0506_0000,
+            lost_telegrams: 21,
+            refused_frames: 22,
+        };
+        status.buses[1] = BusStatus {
+            up: false,
+            phase: PHASE_NONE,
+            cycle_time_ns: 4_000_000,
+            cycles: 0x0708,
+            lost_telegrams: 23,
+            refused_frames: 24,
         };
         status.axes[0] = AxisStatus {
             instance: 1,
@@ -516,6 +588,7 @@ pub(crate) mod tests {
                 several: true,
                 minor_fault: true,
             },
+            controller: Some(Controller { address: Ipv4Addr::new(192, 0, 2, 77), update_period_us: 8_000 }),
         };
         status.axes[1] = AxisStatus {
             instance: 200,
@@ -567,10 +640,17 @@ pub(crate) mod tests {
         status.axis_count = 64;
         publisher.publish(&status);
         assert_eq!(reader.read(), status);
+        status.bus_count = u8::try_from(BUSES_MAX).unwrap();
+        for (place, bus) in (0..).zip(&mut status.buses) {
+            *bus = BusStatus { cycles: place, ..BusStatus::NONE };
+        }
+        publisher.publish(&status);
+        assert_eq!(reader.read(), status);
         // Fewer than before: the others are no axes any more.
-        status.axis_count = 17;
+        (status.axis_count, status.bus_count) = (17, 1);
         publisher.publish(&status);
         let seen = reader.read();
+        assert_eq!(seen.buses[1..], [BusStatus::NONE; BUSES_MAX - 1]);
         assert_eq!(seen.configured_axes(), &status.axes[..17]);
         assert_eq!(seen.axes[17..], [AxisStatus::NONE; AXES_MAX - 17]);
     }

@@ -8,6 +8,7 @@ pub(super) mod can;
 pub(super) mod can_device;
 pub(super) mod device;
 pub(super) mod devicenet;
+mod http;
 mod limits;
 pub(super) mod modbus;
 mod problems;
@@ -46,6 +47,7 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
     let name = value::label(problems, "the box", &file.the_box.name);
     let log_level = log_level(problems, file);
     let modbus = value::optional(&file.modbus, |table| modbus::check(problems, table, &file.axis));
+    let http = value::optional(&file.http, |table| http::check(problems, table, file.modbus.as_ref()));
     let mappings = file.mappings.as_ref();
     let paths = mappings.iter().flat_map(|table| table.dir.iter().chain(&table.overlays));
     for path in paths {
@@ -102,6 +104,7 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
         time: time?,
         log_level: log_level?,
         modbus: modbus?,
+        http: http?,
         mappings_dir,
         overlays,
         settings_file,

@@ -1,0 +1,115 @@
+//! The description of the interface for programs: OpenAPI 3.1, with the schemas of the types that are answered.
+
+use schemars::generate::SchemaSettings;
+use serde_json::{Value, json};
+
+use super::view::Look;
+use crate::local::overview::Overview;
+
+/// Where OpenAPI keeps the schemas.
+const SCHEMAS: &str = "/components/schemas";
+
+/// The description of all paths.
+#[must_use]
+pub fn openapi() -> Value {
+    let mut settings = SchemaSettings::draft2020_12().for_serialize();
+    settings.definitions_path = SCHEMAS.into();
+    let mut generator = settings.into_generator();
+    let overview = generator.subschema_for::<Overview>();
+    let look = generator.subschema_for::<Look>();
+    let schemas = generator.take_definitions(false);
+    let json = |schema: &schemars::Schema| json!({ "application/json": { "schema": schema } });
+    let text = |kind: &str| json!({ kind: { "schema": { "type": "string" } } });
+    let good = |description: &str, content: Value| json!({ "description": description, "content": content });
+    let path =
+        |summary: &str, responses: Value| json!({ "get": { "summary": summary, "responses": responses } });
+    let health = |summary: &str, good_text: &str, bad_text: &str| {
+        let bad = good(bad_text, text("text/plain"));
+        path(summary, json!({ "200": good(good_text, text("text/plain")), "503": bad }))
+    };
+    let file = |summary: &str, kind: &str| path(summary, json!({ "200": good(summary, text(kind)) }));
+    let mut events = path(
+        "The state of the gateway, twice a second, as server-sent events of the type `status`",
+        json!({ "200": good("A stream without end", text("text/event-stream")) }),
+    );
+    events["get"]["responses"]["200"]["x-event-data"] = json!({ "status": look });
+    events["get"]["responses"]["503"] = good("Too many viewers", text("text/plain"));
+    let status = "The same object as that of `axisbridge status --json`";
+    json!({
+        "openapi": "3.1.0",
+        "info": {
+            "title": "Axisbridge",
+            "version": env!("CARGO_PKG_VERSION"),
+            "description": "The state of a running gateway. Every path is read-only.",
+        },
+        "paths": {
+            "/": file("Overview page for people", "text/html"),
+            "/page.css": file("Style of the page", "text/css"),
+            "/page.js": file("Program of the page", "text/javascript"),
+            "/events": events,
+            "/healthz": health(
+                "Whether the cycle thread is alive", "It has published its state in time", "Why not"),
+            "/readyz": health(
+                "Whether every bus is in cyclic operation, and every axis commissioned and without fault",
+                "Nothing is missing",
+                "What is missing, one on each line",
+            ),
+            "/metrics": file("Metrics in the text format of OpenMetrics 1.0", "application/openmetrics-text"),
+            "/api/v1/status": path(status, json!({ "200": good(status, json(&overview)) })),
+            "/api/v1/openapi.json": path(
+                "This description",
+                json!({ "200": good("OpenAPI 3.1", json!({ "application/json": { "schema": { "type": "object" } } })) }),
+            ),
+        },
+        "components": { "schemas": schemas },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn answer_has_exactly_the_fields_of_the_schema() {
+        let description = openapi();
+        let (view, _publisher) = super::super::view::tests::view();
+        let status = serde_json::to_value(view.look()).unwrap();
+        let look = &description["components"]["schemas"]["Look"];
+        compare(&description, look, &status, "Look");
+        let reference = &description["paths"]["/api/v1/status"]["get"]["responses"]["200"]["content"]["application/json"]
+            ["schema"]["$ref"];
+        assert_eq!(reference, "#/components/schemas/Overview");
+    }
+
+    /// Every field of an object is in its schema, and the other way round, as deep as they go.
+    fn compare(description: &Value, schema: &Value, value: &Value, at: &str) {
+        let schema = match schema["$ref"].as_str() {
+            Some(reference) => description.pointer(reference.trim_start_matches('#')).expect("a schema"),
+            None => schema,
+        };
+        match value {
+            Value::Object(fields) => {
+                let named = schema["properties"].as_object().unwrap_or_else(|| panic!("{at}: {schema}"));
+                let keys = |map: &serde_json::Map<String, Value>| {
+                    let mut keys: Vec<String> = map.keys().cloned().collect();
+                    keys.sort();
+                    keys
+                };
+                assert_eq!(keys(fields), keys(named), "{at}");
+                for (key, value) in fields {
+                    assert!(
+                        named[key]["description"].is_string() || named[key]["$ref"].is_string(),
+                        "{at}.{key}"
+                    );
+                    compare(description, &named[key], value, &format!("{at}.{key}"));
+                }
+            }
+            Value::Array(items) => {
+                for item in items {
+                    compare(description, &schema["items"], item, at);
+                }
+            }
+            _ => {}
+        }
+    }
+}

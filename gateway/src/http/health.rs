@@ -1,0 +1,164 @@
+//! Whether the gateway is alive, and whether it is ready.
+
+use std::time::{Duration, Instant};
+
+use profile_generic::inhibit::Inhibits;
+use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::local::overview::{Axis, Bus, Overview};
+use crate::status::{BoxState, BoxStatus};
+
+/// Least age of the published status that means that the cycle thread has stopped. It publishes every 10 ms, or every cycle of
+/// its fastest bus.
+const SILENCE: Duration = Duration::from_secs(1);
+
+/// Cycles without publication that mean the same, for slow buses.
+const SILENT_CYCLES: u32 = 4;
+
+/// The health of a gateway.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Health {
+    /// The cycle thread publishes its state in time.
+    pub alive: bool,
+    /// Why it is not alive.
+    pub reason: Option<String>,
+    /// It is alive, every bus is in cyclic operation, and every axis is commissioned and without fault.
+    pub ready: bool,
+    /// What is missing for `ready`, by name.
+    pub missing: Vec<String>,
+}
+
+impl Health {
+    /// Judges a status that has not changed for `age`.
+    pub(super) fn of(status: &BoxStatus, age: Duration, overview: &Overview) -> Self {
+        let reason = reason(status, age);
+        let mut missing: Vec<String> = reason.clone().into_iter().collect();
+        missing.extend(stage(status.state));
+        missing.extend(overview.buses.iter().filter_map(missing_at_bus));
+        missing.extend(overview.axes.iter().filter_map(missing_at_axis));
+        Self { alive: reason.is_none(), reason, ready: missing.is_empty(), missing }
+    }
+}
+
+/// Why the cycle thread is not alive.
+fn reason(status: &BoxStatus, age: Duration) -> Option<String> {
+    if status.state == BoxState::STARTING {
+        return Some("the cycle thread has not started yet".to_owned());
+    }
+    let slow = Duration::from_nanos(u64::from(status.cycle_time_ns)) * SILENT_CYCLES;
+    let late = age > SILENCE.max(slow);
+    late.then(|| format!("the cycle thread has published nothing for {} s", age.as_secs()))
+}
+
+/// What the state of the whole gateway lacks that no bus lacks.
+fn stage(state: BoxState) -> Option<String> {
+    (state == BoxState::STOPPING).then(|| "the gateway stops".to_owned())
+}
+
+fn missing_at_bus(bus: &Bus) -> Option<String> {
+    let phase = bus.phase.map(|phase| format!(" (CP{phase})")).unwrap_or_default();
+    (!bus.up).then(|| format!("bus {}: not in cyclic operation{phase}", bus.name))
+}
+
+fn missing_at_axis(axis: &Axis) -> Option<String> {
+    let name = &axis.name;
+    if let Some(fault) = &axis.fault {
+        return Some(format!("axis {name}: fault {fault}"));
+    }
+    let no_drive = Inhibits::NAMED.iter().find(|(inhibit, _)| *inhibit == Inhibits::NO_DRIVE);
+    let waits = no_drive.is_some_and(|(_, name)| axis.inhibits.iter().any(|inhibit| inhibit == name));
+    let initialises = axis.state == DriveState::NotReady.name();
+    (waits || initialises).then(|| format!("axis {name}: its drive {} is not commissioned", axis.drive))
+}
+
+/// Since when the published status is the same.
+#[derive(Debug)]
+pub(super) struct Heartbeat {
+    uptime: DurationNs,
+    since: Instant,
+}
+
+impl Heartbeat {
+    pub fn new(now: Instant) -> Self {
+        Self { uptime: DurationNs::ZERO, since: now }
+    }
+
+    /// Takes the uptime of a status, which each publication changes, and returns for how long it has been the same.
+    pub fn age(&mut self, now: Instant, uptime: DurationNs) -> Duration {
+        if self.uptime != uptime {
+            *self = Self { uptime, since: now };
+        }
+        now.saturating_duration_since(self.since)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::view::tests::{installation, time};
+    use super::*;
+    use crate::status::tests::distinct;
+
+    fn health(status: &BoxStatus, age: u64) -> Health {
+        let overview = Overview::of(&installation(), status, &time());
+        Health::of(status, Duration::from_millis(age), &overview)
+    }
+
+    /// The status of a gateway with nothing wrong.
+    fn good() -> BoxStatus {
+        let mut status = distinct();
+        status.buses[1].up = true;
+        status.axes[1] = status.axes[0];
+        status
+    }
+
+    #[test]
+    fn gateway_without_fault_is_ready() {
+        let health = health(&good(), 10);
+        assert_eq!(health, Health { alive: true, reason: None, ready: true, missing: Vec::new() });
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let mut status = distinct();
+        status.axes[0].inhibits = Inhibits::NO_DRIVE;
+        let found = health(&status, 10);
+        assert!(found.alive && !found.ready);
+        let missing = [
+            "bus CAN bus 1: not in cyclic operation",
+            "axis turntable: its drive drive-a is not commissioned",
+            "axis slide: fault safety_core",
+        ];
+        assert_eq!(found.missing, missing);
+        status.axes[0].inhibits = Inhibits::NO_POWER;
+        assert_eq!(health(&status, 10).missing.len(), 2, "main power is no commissioning");
+        status.axes[0].state = DriveState::NotReady;
+        assert_eq!(health(&status, 10).missing.len(), 3);
+        let stopping = BoxStatus { state: BoxState::STOPPING, ..good() };
+        assert_eq!(health(&stopping, 10).missing, ["the gateway stops"]);
+    }
+
+    #[test]
+    fn cycle_thread_that_publishes_nothing_is_not_alive() {
+        assert!(health(&good(), 1_000).alive);
+        let dead = health(&good(), 1_001);
+        assert_eq!(dead.reason.as_deref(), Some("the cycle thread has published nothing for 1 s"));
+        assert_eq!((dead.ready, dead.missing.len()), (false, 1));
+        let slow = BoxStatus { cycle_time_ns: 1_000_000_000, ..good() };
+        assert!(health(&slow, 4_000).alive && !health(&slow, 4_001).alive);
+        let starting = health(&BoxStatus::STARTING, 0);
+        assert_eq!(starting.reason.as_deref(), Some("the cycle thread has not started yet"));
+    }
+
+    #[test]
+    fn age_counts_from_the_last_change_of_uptime() {
+        let start = Instant::now();
+        let mut heartbeat = Heartbeat::new(start);
+        let mut age = |millis, uptime| {
+            heartbeat.age(start + Duration::from_millis(millis), DurationNs(uptime)).as_millis()
+        };
+        assert_eq!([age(5, 0), age(7, 1), age(9, 1), age(30, 1), age(31, 2)], [5, 0, 2, 23, 0]);
+    }
+}

@@ -1,0 +1,27 @@
+//! A read-only HTTP server: health, metrics, status, and a page for people.
+//!
+//! ```text
+//! cycle thread --status--> View --Look--> /healthz /readyz /metrics /api/v1/status
+//!                            \--twice a second--> /events --> page in a browser
+//! ```
+//!
+//! The server has one thread of its own, below the priority of every other one, and takes only what the cycle thread
+//! publishes anyway: requests, viewers and floods cost the cycle nothing. No request changes anything.
+
+mod api;
+mod events;
+mod health;
+mod limits;
+mod metrics;
+mod page;
+mod routes;
+mod server;
+#[cfg(test)]
+mod tests;
+mod view;
+
+pub use api::openapi;
+pub use health::Health;
+pub use metrics::metrics;
+pub use server::{HttpServer, RunningServer};
+pub use view::{Look, View};

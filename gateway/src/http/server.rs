@@ -1,0 +1,169 @@
+//! The server: a bounded number of connections on a thread of its own.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use axum::Router;
+use hyper_util::rt::TokioIo;
+use hyper_util::service::TowerToHyperService;
+use tokio::sync::{Semaphore, oneshot};
+
+use super::events::Events;
+use super::limits::{HEADER_TIME_OUT, Peer, STALL_TIME_OUT, builder};
+use super::routes::{Sources, routes};
+use super::view::View;
+
+/// Pause after accepting has failed, mostly because the process has no descriptors left.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Nice value of the thread: it runs when no other thread of the gateway needs the processor.
+const NICE: i32 = 10;
+
+/// A server that listens; [`HttpServer::start`] lets it answer.
+#[derive(Debug)]
+pub struct HttpServer {
+    listener: TcpListener,
+    connections_max: usize,
+    header_time_out: Duration,
+    stall_time_out: Duration,
+}
+
+/// A server that answers until this is dropped.
+#[derive(Debug)]
+pub struct RunningServer {
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for RunningServer {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            // A panic has been printed where it happened.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What the server counts of itself.
+#[derive(Debug, Default)]
+pub struct Load {
+    accepted: AtomicU64,
+    refused: AtomicU64,
+}
+
+/// The counters at one moment.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Connections that were accepted.
+    pub accepted: u64,
+    /// Connections that were closed because too many were open.
+    pub refused: u64,
+}
+
+impl Load {
+    /// The counters now.
+    pub fn read(&self) -> Counts {
+        Counts {
+            accepted: self.accepted.load(Ordering::Relaxed),
+            refused: self.refused.load(Ordering::Relaxed),
+        }
+    }
+}
+
+impl HttpServer {
+    /// Listens at `address` for at most `connections_max` connections at once, half of them for pages.
+    ///
+    /// # Errors
+    /// The address cannot be had.
+    pub fn bind(address: SocketAddr, connections_max: u16) -> io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        Ok(Self {
+            listener,
+            connections_max: usize::from(connections_max),
+            header_time_out: HEADER_TIME_OUT,
+            stall_time_out: STALL_TIME_OUT,
+        })
+    }
+
+    /// Where it listens.
+    ///
+    /// # Errors
+    /// The system's error.
+    pub fn local_address(&self) -> io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// Sets how long a peer may take for its request, and how long it may leave an answer unread.
+    #[cfg(test)]
+    pub(super) fn limit_times(&mut self, header: Duration, stall: Duration) {
+        (self.header_time_out, self.stall_time_out) = (header, stall);
+    }
+
+    /// Answers on a thread of its own.
+    ///
+    /// # Errors
+    /// The system gives no thread, or nothing to wait for sockets with.
+    pub fn start(self, view: View) -> io::Result<RunningServer> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let (stop, stopped) = oneshot::channel::<()>();
+        let run = move || {
+            // It never needs a privilege to be nicer; without it the server works all the same.
+            let _ = rustix::process::setpriority_process(None, NICE);
+            runtime.block_on(async {
+                tokio::select! {
+                    ended = self.run(view) => if let Err(error) = ended {
+                        tracing::warn!(%error, "HTTP ended");
+                    },
+                    _ = stopped => {}
+                }
+            });
+            // The connections end with the runtime.
+        };
+        let thread = std::thread::Builder::new().name("axisbridge-http".to_owned()).spawn(run)?;
+        Ok(RunningServer { stop: Some(stop), thread: Some(thread) })
+    }
+
+    /// Answers until the future is dropped. A connection above the limit is closed at once.
+    async fn run(self, view: View) -> io::Result<()> {
+        let listener = tokio::net::TcpListener::from_std(self.listener)?;
+        let view = Arc::new(view);
+        let events = Arc::new(Events::new(Arc::clone(&view), self.connections_max / 2));
+        let load = Arc::new(Load::default());
+        let router = routes(Sources { view, events: Arc::clone(&events), load: Arc::clone(&load) });
+        let places = Arc::new(Semaphore::new(self.connections_max));
+        tokio::spawn(async move { events.run().await });
+        loop {
+            let (stream, peer) = match listener.accept().await {
+                Ok(accepted) => accepted,
+                Err(error) => {
+                    tracing::debug!(%error, "no HTTP connection can be accepted");
+                    tokio::time::sleep(ACCEPT_PAUSE).await;
+                    continue;
+                }
+            };
+            let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
+                if load.refused.fetch_add(1, Ordering::Relaxed) == 0 {
+                    tracing::warn!(%peer, "HTTP connection refused: too many are open; further ones are counted");
+                }
+                continue;
+            };
+            load.accepted.fetch_add(1, Ordering::Relaxed);
+            let peer = Peer::new(stream, self.stall_time_out, place);
+            tokio::spawn(serve(peer, router.clone(), self.header_time_out));
+        }
+    }
+}
+
+/// Answers the one request of a connection.
+async fn serve(peer: Peer, router: Router, header_time_out: Duration) {
+    let service = TowerToHyperService::new(router);
+    if let Err(error) = builder(header_time_out).serve_connection(TokioIo::new(peer), service).await {
+        tracing::debug!(%error, "HTTP connection gone");
+    }
+}

@@ -1,0 +1,276 @@
+//! The server on a socket: what each path answers, and what peers that misbehave get.
+
+use std::io::{Read as _, Write as _};
+use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpStream};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use super::server::HttpServer;
+use super::view::tests::{installation, time, view};
+use super::{RunningServer, openapi};
+use crate::latest::Publisher;
+use crate::local::overview::Overview;
+use crate::status::BoxStatus;
+use crate::status::tests::distinct;
+
+/// How long an answer may take on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A server and the end where another status can be published.
+struct Bench {
+    address: SocketAddr,
+    publisher: Publisher<BoxStatus>,
+    server: RunningServer,
+}
+
+/// An answer: status code, head and body.
+struct Answer {
+    code: u16,
+    head: String,
+    body: String,
+}
+
+impl Bench {
+    fn start() -> Self {
+        Self::with(64, |_| {})
+    }
+
+    fn with(connections_max: u16, change: impl FnOnce(&mut HttpServer)) -> Self {
+        let (view, publisher) = view();
+        let mut server = HttpServer::bind((Ipv4Addr::LOCALHOST, 0).into(), connections_max).unwrap();
+        change(&mut server);
+        let address = server.local_address().unwrap();
+        Self { address, publisher, server: server.start(view).unwrap() }
+    }
+
+    fn connect(&self) -> TcpStream {
+        let stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream
+    }
+
+    /// Sends these bytes and returns everything that comes back.
+    fn send(&self, bytes: &[u8]) -> String {
+        let mut stream = self.connect();
+        // A server that has seen enough closes the connection before the end.
+        let _ = stream.write_all(bytes);
+        let mut text = Vec::new();
+        let _ = stream.read_to_end(&mut text);
+        String::from_utf8(text).unwrap()
+    }
+
+    fn ask(&self, method: &str, path: &str) -> Answer {
+        let text = self.send(format!("{method} {path} HTTP/1.1\r\nHost: gateway\r\n\r\n").as_bytes());
+        let (head, body) = text.split_once("\r\n\r\n").unwrap_or_else(|| panic!("{path}: {text:?}"));
+        let code = head.split(' ').nth(1).unwrap().parse().unwrap();
+        Answer { code, head: head.to_ascii_lowercase(), body: body.to_owned() }
+    }
+
+    fn get(&self, path: &str) -> Answer {
+        self.ask("GET", path)
+    }
+
+    /// A status in which nothing is wrong.
+    fn publish_good(&mut self) {
+        let mut status = distinct();
+        status.buses[1].up = true;
+        status.axes[1] = status.axes[0];
+        self.publisher.publish(&status);
+    }
+}
+
+/// Reads until the text contains `wanted`.
+fn read_until(stream: &mut TcpStream, wanted: &str) -> String {
+    let end = Instant::now() + PATIENCE;
+    let mut text = String::new();
+    let mut buffer = [0; 4096];
+    while !text.contains(wanted) {
+        assert!(Instant::now() < end, "{text}");
+        let count = stream.read(&mut buffer).unwrap();
+        assert!(count > 0, "the stream has ended: {text}");
+        text.push_str(std::str::from_utf8(&buffer[..count]).unwrap());
+    }
+    text
+}
+
+#[test]
+fn status_is_the_object_of_the_command_line() {
+    let bench = Bench::start();
+    let answer = bench.get("/api/v1/status");
+    assert!(answer.code == 200 && answer.head.contains("content-type: application/json"), "{}", answer.head);
+    let expected = Overview::of(&installation(), &distinct(), &time());
+    assert_eq!(answer.body, serde_json::to_string(&expected).unwrap());
+}
+
+#[test]
+fn health_and_readiness_are_answered_with_reasons() {
+    let mut bench = Bench::start();
+    let answer = bench.get("/healthz");
+    assert_eq!((answer.code, answer.body.as_str()), (200, "alive\n"));
+    let answer = bench.get("/readyz");
+    let missing = "bus CAN bus 1: not in cyclic operation\naxis slide: fault safety_core\n";
+    assert_eq!((answer.code, answer.body.as_str()), (503, missing));
+    bench.publish_good();
+    let answer = bench.get("/readyz");
+    assert_eq!((answer.code, answer.body.as_str()), (200, "ready\n"));
+    // The cycle thread publishes nothing any more.
+    let end = Instant::now() + PATIENCE;
+    loop {
+        let answer = bench.get("/healthz");
+        if answer.code == 503 {
+            assert!(
+                answer.body.starts_with("the cycle thread has published nothing for "),
+                "{}",
+                answer.body
+            );
+            break;
+        }
+        assert!(Instant::now() < end, "{}", answer.body);
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    assert_eq!(bench.get("/readyz").code, 503);
+}
+
+#[test]
+fn metrics_are_open_metrics() {
+    let bench = Bench::start();
+    let answer = bench.get("/metrics");
+    let kind = "content-type: application/openmetrics-text; version=1.0.0; charset=utf-8";
+    assert!(answer.code == 200 && answer.head.contains(kind), "{}", answer.head);
+    assert!(answer.body.contains("\naxisbridge_axis_fault{axis=\"slide\",fault=\"safety_core\"} 1"));
+    assert!(
+        answer.body.contains("\naxisbridge_axis_position_revolutions{axis=\"turntable\"} -1234.567890123\n")
+    );
+    assert!(answer.body.ends_with("# EOF\n"));
+}
+
+#[test]
+fn every_path_of_the_description_is_answered_and_no_other() {
+    let bench = Bench::start();
+    let answer = bench.get("/api/v1/openapi.json");
+    let description: Value = serde_json::from_str(&answer.body).unwrap();
+    assert_eq!(description, openapi());
+    let paths: Vec<&String> = description["paths"].as_object().unwrap().keys().collect();
+    assert_eq!(paths.len(), 9);
+    for path in paths {
+        // A stream has no end: its head is enough.
+        let answer = bench.ask("HEAD", path);
+        let good = &description["paths"][path]["get"]["responses"][answer.code.to_string()];
+        let kind = good["content"].as_object().and_then(|content| content.keys().next()).expect(path);
+        assert!(answer.head.contains(&format!("content-type: {kind}")), "{path}: {}", answer.head);
+        assert_eq!(answer.body, "", "{path}: a head has no body");
+        for part in
+            ["content-security-policy: default-src 'none'; script-src 'self'", "cache-control: no-store"]
+        {
+            assert!(answer.head.contains(part), "{path}: {}", answer.head);
+        }
+        for method in ["POST", "PUT", "DELETE", "PATCH", "OPTIONS"] {
+            let refused = bench.ask(method, path);
+            assert_eq!(refused.code, 405, "{method} {path}");
+            assert!(refused.head.contains("allow: get,head"), "{}", refused.head);
+        }
+    }
+    for path in ["/index.html", "/api", "/api/v1/status/", "/../etc/passwd", "/metrics/x", "//"] {
+        assert_eq!(bench.get(path).code, 404, "{path}");
+    }
+}
+
+#[test]
+fn stream_begins_with_the_state_and_follows_it() {
+    let mut bench = Bench::start();
+    let mut stream = bench.connect();
+    stream.write_all(b"GET /events HTTP/1.1\r\nHost: gateway\r\nAccept: text/event-stream\r\n\r\n").unwrap();
+    let first = read_until(&mut stream, "\"fault\":\"safety_core\"");
+    assert!(first.contains("content-type: text/event-stream"), "{first}");
+    assert!(first.contains("retry: 2000\nevent: status\ndata: {\"health\":{\"alive\":true,"), "{first}");
+    bench.publish_good();
+    read_until(&mut stream, "\"ready\":true");
+    // The stream ends with the server.
+    drop(bench.server);
+    let mut rest = Vec::new();
+    let _ = stream.read_to_end(&mut rest);
+}
+
+#[test]
+fn viewers_leave_room_for_other_requests() {
+    let bench = Bench::with(8, |_| {});
+    let viewer = || {
+        let mut stream = bench.connect();
+        stream.write_all(b"GET /events HTTP/1.1\r\nHost: gateway\r\n\r\n").unwrap();
+        read_until(&mut stream, "\r\n\r\n");
+        stream
+    };
+    let mut viewers: Vec<_> = (0..4).map(|_| viewer()).collect();
+    let answer = bench.get("/events");
+    assert_eq!((answer.code, answer.body.as_str()), (503, "too many viewers\n"));
+    assert_eq!(bench.get("/healthz").code, 200);
+    // The place of a viewer who has gone becomes free.
+    viewers.pop();
+    let end = Instant::now() + PATIENCE;
+    loop {
+        let mut stream = bench.connect();
+        stream.write_all(b"GET /events HTTP/1.1\r\nHost: gateway\r\n\r\n").unwrap();
+        if read_until(&mut stream, "\r\n").starts_with("HTTP/1.1 200") {
+            break;
+        }
+        assert!(Instant::now() < end, "the place stays taken");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn oversized_and_malformed_requests_are_refused() {
+    let bench = Bench::start();
+    let long = format!("GET /{} HTTP/1.1\r\nHost: gateway\r\n\r\n", "x".repeat(20_000));
+    let many = format!("GET / HTTP/1.1\r\n{}\r\n", "A: b\r\n".repeat(65));
+    for bytes in [long, many, format!("GET / HTTP/1.1\r\nA: {}\r\n\r\n", "b".repeat(20_000))] {
+        let answer = bench.send(bytes.as_bytes());
+        // The rest of what was sent may reset the connection before the answer is read.
+        assert!(answer.is_empty() || answer.starts_with("HTTP/1.1 431"), "{answer}");
+    }
+    for bytes in [&b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"[..], b"hello\r\n\r\n", b"\0\0\0\0\r\n\r\n"]
+    {
+        let answer = bench.send(bytes);
+        assert!(answer.is_empty() || answer.starts_with("HTTP/1.1 400"), "{answer}");
+    }
+    // A body is never read.
+    let head = "GET /healthz HTTP/1.1\r\nHost: gateway\r\nContent-Length: 1000000000000\r\n\r\n";
+    assert!(bench.send(head.as_bytes()).starts_with("HTTP/1.1 200"), "answered before the body");
+    assert_eq!(bench.get("/healthz").code, 200);
+}
+
+#[test]
+fn half_open_connections_end_and_more_than_the_limit_are_closed() {
+    let time_out = Duration::from_millis(1_500);
+    let bench = Bench::with(16, |server| server.limit_times(time_out, time_out));
+    let began = Instant::now();
+    let mut silent: Vec<TcpStream> = (0..200).map(|_| bench.connect()).collect();
+    for (number, stream) in silent.iter_mut().enumerate() {
+        // The first ones send half a head, the others nothing.
+        if number % 2 == 0 {
+            let _ = stream.write_all(b"GET /healthz HTTP/1.1\r\nHo");
+        }
+    }
+    for mut stream in silent {
+        let mut rest = Vec::new();
+        let _ = stream.read_to_end(&mut rest);
+        assert!(rest.is_empty() || rest.starts_with(b"HTTP/1.1 408"), "{rest:?}");
+    }
+    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
+    let answer = bench.get("/metrics");
+    let refused = answer.body.lines().find_map(|line| {
+        line.strip_prefix("axisbridge_http_refused_connections_total ")?.parse::<u32>().ok()
+    });
+    assert!(refused.is_some_and(|refused| (1..=184).contains(&refused)), "{refused:?}");
+}
+
+#[test]
+fn peer_that_has_finished_sending_is_no_error() {
+    let bench = Bench::start();
+    let mut stream = bench.connect();
+    stream.write_all(b"GET /healthz HTTP/1.0\r\n\r\n").unwrap();
+    let text = read_until(&mut stream, "alive\n");
+    assert!(text.starts_with("HTTP/1.0 200"), "{text}");
+    let _ = stream.shutdown(Shutdown::Write);
+}

@@ -1,0 +1,158 @@
+//! What does not change while the gateway runs: the names of its devices, buses and axes.
+
+use std::net::Ipv4Addr;
+
+use crate::config::{Axis, AxisKind, CanLink, Config, DriveAt, Link, TimeSource};
+use crate::engine::bus::BusName;
+
+/// The parts of a gateway by name, in the order in which the published status has them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Installation {
+    /// Name of the gateway.
+    pub name: String,
+    /// Source of system time.
+    pub source: TimeSource,
+    /// The CIP Motion devices.
+    pub devices: Vec<NamedDevice>,
+    /// The SERCOS bus, the CANopen buses, the DeviceNet networks.
+    pub buses: Vec<NamedBus>,
+    /// The axes.
+    pub axes: Vec<NamedAxis>,
+}
+
+/// A CIP Motion device.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedDevice {
+    /// Its name.
+    pub name: String,
+    /// The address of the gateway that it listens on.
+    pub address: Ipv4Addr,
+}
+
+/// A bus.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedBus {
+    /// Its name, as the log has it: `SERCOS`, `CAN bus 1`, `DeviceNet 1`.
+    pub name: String,
+    /// Its interface, two for a ring, or `in-process`.
+    pub interface: String,
+}
+
+/// An axis.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedAxis {
+    /// Its name.
+    pub name: String,
+    /// Rotary or linear.
+    pub kind: AxisKind,
+    /// Place of its bus in [`Installation::buses`].
+    pub bus: usize,
+    /// Name of its drive.
+    pub drive: String,
+}
+
+impl Installation {
+    /// The parts of a configuration.
+    #[must_use]
+    pub fn of(config: &Config) -> Self {
+        let device = |device: &crate::config::Device| NamedDevice {
+            name: device.name.clone(),
+            address: device.listen,
+        };
+        let sercos = config
+            .sercos
+            .iter()
+            .map(|bus| NamedBus { name: BusName::Sercos.to_string(), interface: interface_of(&bus.link) });
+        let can = (1..).zip(&config.can).map(|(number, bus)| named_can(BusName::Can(number), &bus.link));
+        let devicenet = (1..)
+            .zip(&config.devicenet)
+            .map(|(number, network)| named_can(BusName::Devicenet(number), &network.link));
+        Self {
+            name: config.name.clone(),
+            source: config.time.source,
+            devices: config.devices.iter().map(device).collect(),
+            buses: sercos.chain(can).chain(devicenet).collect(),
+            axes: config.axes.iter().map(|axis| named_axis(config, axis)).collect(),
+        }
+    }
+
+    /// The bus of an axis, by the place of the axis.
+    #[must_use]
+    pub fn bus_of(&self, axis: usize) -> Option<&NamedBus> {
+        self.buses.get(self.axes.get(axis)?.bus)
+    }
+}
+
+fn interface_of(link: &Link) -> String {
+    match link {
+        Link::Interface { name, ring: Some(ring) } => format!("{name}, {ring}"),
+        Link::Interface { name, ring: None } => name.clone(),
+        Link::InProcess { .. } => "in-process".to_owned(),
+    }
+}
+
+fn named_can(name: BusName, link: &CanLink) -> NamedBus {
+    let interface = match link {
+        CanLink::Interface { name, .. } => name.clone(),
+        CanLink::InProcess => "in-process".to_owned(),
+    };
+    NamedBus { name: name.to_string(), interface }
+}
+
+fn named_axis(config: &Config, axis: &Axis) -> NamedAxis {
+    let before_can = usize::from(config.sercos.is_some());
+    let bus = match axis.drive {
+        DriveAt::Sercos { .. } => 0,
+        DriveAt::Can { bus, .. } => before_can + bus,
+        DriveAt::Devicenet { network, .. } => before_can + config.can.len() + network,
+    };
+    let sercos = config.sercos_drive(axis).map(|drive| &drive.name);
+    let can = || config.can_drive(axis).map(|(_, drive)| &drive.name);
+    let devicenet = || config.devicenet_drive(axis).map(|(_, drive)| &drive.name);
+    let drive = sercos.or_else(can).or_else(devicenet).cloned().unwrap_or_default();
+    NamedAxis { name: axis.name.clone(), kind: axis.kind, bus, drive }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// The names of the gateway of [`crate::status::tests::distinct`].
+    pub(crate) fn installation() -> Installation {
+        let axis = |name: &str, kind, bus, drive: &str| NamedAxis {
+            name: name.to_owned(),
+            kind,
+            bus,
+            drive: drive.to_owned(),
+        };
+        let device =
+            |name: &str, last| NamedDevice { name: name.to_owned(), address: Ipv4Addr::new(192, 0, 2, last) };
+        let bus =
+            |name: &str, interface: &str| NamedBus { name: name.to_owned(), interface: interface.to_owned() };
+        Installation {
+            name: "cell 4".to_owned(),
+            source: TimeSource::Ptp,
+            devices: vec![device("front", 1), device("back", 2)],
+            buses: vec![bus("SERCOS", "eth1, eth2"), bus("CAN bus 1", "can0")],
+            axes: vec![
+                axis("turntable", AxisKind::Rotary, 0, "drive-a"),
+                axis("slide", AxisKind::Linear, 1, "drive-b"),
+            ],
+        }
+    }
+
+    #[test]
+    fn devices_buses_and_drives_have_their_names() {
+        let text = include_str!("../../../examples/two-axes-in-process.toml");
+        let found = Installation::of(&Config::parse(text, "two-axes-in-process.toml").unwrap());
+        assert_eq!((found.name.as_str(), found.source), ("two axes", TimeSource::Shared));
+        let device = NamedDevice { name: "front".to_owned(), address: Ipv4Addr::new(127, 0, 0, 2) };
+        assert_eq!(found.devices, [device]);
+        let bus = NamedBus { name: "SERCOS".to_owned(), interface: "in-process".to_owned() };
+        assert_eq!(found.buses, [bus]);
+        let axes: Vec<_> = found.axes.iter().map(|axis| (&*axis.name, &*axis.drive, axis.bus)).collect();
+        assert_eq!(axes, [("turntable", "drive-a", 0), ("slide", "drive-b", 0)]);
+        assert_eq!(found.bus_of(1).map(|bus| &*bus.name), Some("SERCOS"));
+        assert_eq!(found.bus_of(2), None);
+    }
+}
