@@ -354,4 +354,44 @@ mod tests {
         let text = text.replace(env!("CARGO_PKG_VERSION"), "VERSION");
         insta::assert_snapshot!(text);
     }
+
+    /// The names of metrics in a query.
+    fn names(query: &str) -> impl Iterator<Item = &str> {
+        let words = query.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+        words.filter(|word| word.starts_with("axisbridge_"))
+    }
+
+    /// The labels in a legend such as `{{axis}}: {{state}}`.
+    fn labels(legend: &str) -> impl Iterator<Item = &str> {
+        legend.split("{{").skip(1).filter_map(|rest| rest.split("}}").next())
+    }
+
+    #[test]
+    fn dashboard_asks_for_metrics_and_labels_that_exist() {
+        let (view, _publisher) = view();
+        let text = metrics(&view.look(), view.started(), &Counts::default());
+        let dashboard = include_str!("../../../examples/grafana/axisbridge.json");
+        let dashboard: serde_json::Value = serde_json::from_str(dashboard).unwrap();
+        let list = |value: &serde_json::Value| value.as_array().cloned().unwrap_or_default();
+        let mut count = 0;
+        for panel in list(&dashboard["panels"]) {
+            for target in list(&panel["targets"]) {
+                let query = target["expr"].as_str().unwrap();
+                let legend = target["legendFormat"].as_str().unwrap();
+                let name = names(query).next().unwrap_or_else(|| panic!("{query} asks for no metric"));
+                let series = text.lines().find(|line| line.split(['{', ' ']).next() == Some(name));
+                let series = series.unwrap_or_else(|| panic!("{query}: there is no {name}"));
+                for label in labels(legend) {
+                    assert!(series.contains(&format!("{label}=\"")), "{name} has no label {label}: {series}");
+                }
+                count += 1;
+            }
+        }
+        for variable in list(&dashboard["templating"]["list"]) {
+            for name in names(variable["query"]["query"].as_str().unwrap_or_default()) {
+                assert!(text.contains(&format!("\n{name}{{")), "{name}");
+            }
+        }
+        assert!(count > 20, "{count} queries");
+    }
 }

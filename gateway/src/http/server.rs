@@ -79,7 +79,7 @@ impl HttpServer {
     /// Listens at `address` for at most `connections_max` connections at once, half of them for pages.
     ///
     /// # Errors
-    /// The address cannot be had.
+    /// The address cannot be used.
     pub fn bind(address: SocketAddr, connections_max: u16) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
@@ -108,7 +108,7 @@ impl HttpServer {
     /// Answers on a thread of its own.
     ///
     /// # Errors
-    /// The system gives no thread, or nothing to wait for sockets with.
+    /// The system refuses the thread or its runtime.
     pub fn start(self, view: View) -> io::Result<RunningServer> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let (stop, stopped) = oneshot::channel::<()>();

@@ -3,6 +3,7 @@
 mod demo;
 mod doctor;
 mod ending;
+mod http;
 mod local;
 mod param;
 mod reload;

@@ -122,16 +122,20 @@ function showBuses(buses) {
 
 function axisCells(axis) {
   const drive = [axis.bus, axis.drive].filter(Boolean).join(', ');
+  // Nothing is heard from the drive: what it has reported before is not live.
+  const old = axis.inhibits.includes('no_drive');
+  const tone = old ? 'old' : '';
+  const mode = axis.mode === 'none' ? '' : `mode ${axis.mode}`;
   return [
     { text: axis.name, more: axis.device ? `${axis.device} → ${drive}` : drive },
     { text: axis.cip_state || 'not on a device', tone: stateTone(axis.cip_state || ''), more: axis.display },
     { text: axis.state, tone: stateTone(axis.state) },
-    { text: axis.drive_status.join(', ') || 'nothing', more: axis.mode === 'none' ? '' : `mode ${axis.mode}` },
+    { text: axis.drive_status.join(', ') || 'nothing', tone, more: old ? 'last reported' : mode },
     { text: axis.owner },
-    { text: number(axis.position, 6, axis.unit) },
-    { text: number(axis.velocity, 6, `${axis.unit}/s`) },
-    { text: number(axis.torque, 1, '%') },
-    { text: number(axis.following_error, 6, axis.unit) },
+    { text: number(axis.position, 6, axis.unit), tone, more: old ? 'last reported' : '' },
+    { text: number(axis.velocity, 6, `${axis.unit}/s`), tone },
+    { text: number(axis.torque, 1, '%'), tone },
+    { text: number(axis.following_error, 6, axis.unit), tone },
   ];
 }
 
