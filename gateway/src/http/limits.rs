@@ -142,7 +142,7 @@ mod tests {
         while count < LEN {
             // All pauses together are longer than the time for one.
             sleep(Duration::from_millis(150)).await;
-            let end = count + (1 << 20);
+            let end = (count + (1 << 20)).min(LEN);
             while count < end {
                 count += tokio::io::AsyncReadExt::read(&mut reader, &mut buffer).await.unwrap();
             }

@@ -184,9 +184,10 @@ function showNotes(body, notes) {
 function showTime(time) {
   const pairs = [
     ['Source', time.source],
-    ['State', time.state, time.synchronized ? 'good' : time.source === 'none' ? '' : 'bad'],
-    ['Synchronized', time.synchronized ? 'yes' : 'no'],
+    ['Synchronized', time.synchronized ? 'yes' : 'no',
+      time.synchronized ? 'good' : time.source === 'none' ? '' : 'bad'],
   ];
+  if (time.state !== 'synchronized') pairs.push(['State', time.state]);
   if (time.grandmaster !== null) pairs.push(['Grandmaster', time.grandmaster]);
   if (time.offset_ns !== null) pairs.push(['Offset', span(time.offset_ns)]);
   if (time.path_delay_ns !== null) pairs.push(['Path delay', span(time.path_delay_ns)]);
@@ -237,25 +238,25 @@ function show({ health, status }) {
   showCycles(status.cycles);
 }
 
+let source = null;
 let lastEventAt = null;
-let silentSince = '';
+let lastLiveAt = '';
 
 function live() {
   document.body.classList.remove('stale');
   setText(byId('connection'), 'Live');
-  silentSince = '';
+  lastLiveAt = new Date().toLocaleTimeString();
 }
 
 function stale(why) {
-  if (!silentSince) silentSince = new Date().toLocaleTimeString();
   document.body.classList.add('stale');
-  const values = lastEventAt === null ? '' : ` The values below are old: they have not changed since ${silentSince}.`;
+  const values = lastLiveAt ? ` The values below are old: they are those of ${lastLiveAt}.` : '';
   setText(byId('connection'), `${why}${values}`);
   document.title = document.title.replace(/: .*/, ': no data');
 }
 
 function connect() {
-  const source = new EventSource('/events');
+  source = new EventSource('/events');
   source.addEventListener('status', (event) => {
     const look = JSON.parse(event.data);
     show(look);
@@ -271,7 +272,9 @@ function connect() {
 }
 
 setInterval(() => {
-  if (lastEventAt !== null && performance.now() - lastEventAt > STALE_AFTER_MS) {
+  const silent = lastEventAt !== null && performance.now() - lastEventAt > STALE_AFTER_MS;
+  // Without a connection the page has said so already.
+  if (silent && source.readyState === EventSource.OPEN) {
     stale('No data from the gateway.');
   }
 }, 500);
