@@ -135,13 +135,13 @@ mod tests {
         let place = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
         let (stream, _) = listener.accept().await.unwrap();
         let mut peer = Peer::new(stream, Duration::from_millis(900), place);
-        const LEN: usize = 12 << 20;
+        const LEN: usize = 32 << 20;
         let write = tokio::spawn(async move { peer.write_all(&vec![0; LEN]).await });
         let mut buffer = vec![0; 1 << 20];
         let mut count = 0;
         while count < LEN {
             // All pauses together are longer than the time for one.
-            sleep(Duration::from_millis(150)).await;
+            sleep(Duration::from_millis(100)).await;
             let end = (count + (1 << 20)).min(LEN);
             while count < end {
                 count += tokio::io::AsyncReadExt::read(&mut reader, &mut buffer).await.unwrap();
