@@ -144,7 +144,9 @@ mod tests {
             sleep(Duration::from_millis(100)).await;
             let end = (count + (1 << 20)).min(LEN);
             while count < end {
-                count += tokio::io::AsyncReadExt::read(&mut reader, &mut buffer).await.unwrap();
+                let read = tokio::io::AsyncReadExt::read(&mut reader, &mut buffer).await.unwrap();
+                assert!(read > 0, "closed after {count} bytes");
+                count += read;
             }
         }
         write.await.unwrap().unwrap();
