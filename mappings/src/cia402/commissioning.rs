@@ -218,7 +218,8 @@ impl Cia402Tables {
             if self.entry(rule, axis, facts)?.is_some() {
                 continue;
             }
-            let Some(entry) = self.entry_at(common, rule, axis, facts)? else { continue };
+            // It is written to a drive that has none of the objects as well: what the drive refuses is reported.
+            let Some(entry) = self.entry_in(common, rule, axis, facts)? else { continue };
             let size = generic.unsigned_abs();
             if least.as_ref().is_none_or(|(known, _)| size < *known) {
                 least = Some((size, octets(common.object, &entry, *generic)?));

@@ -615,6 +615,17 @@ impl Cia402Tables {
         if facts.is_missing(value.object) {
             return Ok(None);
         }
+        self.entry_in(value, rule, axis, facts)
+    }
+
+    /// The same, whether the drive has the object or not.
+    pub(super) fn entry_in(
+        &self,
+        value: &Value,
+        rule: &ParameterRule,
+        axis: &Cia402Axis,
+        facts: &ObjectFacts,
+    ) -> Result<Option<ParameterEntry>, Cia402Error> {
         let count = match self.count(value, rule.quantity, axis, facts) {
             Ok(count) => count,
             Err(Cia402Error::NoScaling(_) | Cia402Error::Way) => return Ok(None),

@@ -228,8 +228,8 @@ function showHealth(health, status) {
 function show({ health, status }) {
   setText(byId('name'), status.name);
   const connected = status.connections === 1 ? '1 controller' : `${status.connections} controllers`;
-  setText(byId('summary'),
-    `Axisbridge ${status.version}, ${status.state}, ${connected}, up ${duration(status.uptime_s)}`);
+  // Whether it is ready stands below, with what is missing.
+  setText(byId('summary'), `Axisbridge ${status.version}, ${connected}, up ${duration(status.uptime_s)}`);
   showHealth(health, status);
   showDevices(status.devices);
   showBuses(status.buses);
