@@ -136,14 +136,14 @@ pub enum Fact {
     Silent,
 }
 
-/// What leads the axis.
+/// What controls the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Control {
     /// Nothing: there is no torque, and no loop is closed.
     #[default]
     Off,
     /// The set-points of the gateway, in this mode.
-    Led(OperatingMode),
+    Gateway(OperatingMode),
     /// The drive by itself, such as in a stop.
     Drive,
 }
@@ -153,7 +153,7 @@ pub enum Control {
 pub struct Known {
     /// Each of them.
     pub facts: [Fact; READS_MAX],
-    /// What leads the axis.
+    /// What controls the axis.
     pub control: Control,
 }
 
@@ -438,7 +438,7 @@ impl Row {
         match control {
             _ if self.modes.is_empty() => Ok(true),
             Control::Off => Ok(false),
-            Control::Led(mode) => Ok(self.modes.contains(&mode)),
+            Control::Gateway(mode) => Ok(self.modes.contains(&mode)),
             Control::Drive => Err(NoValue::Mode),
         }
     }
@@ -447,20 +447,18 @@ impl Row {
 impl Read {
     /// Whether a drive with this program has it.
     fn is_in(&self, program: &DriveProgram) -> bool {
-        let has = |parameter: Parameter| {
-            parameter == Parameter::MOTOR_TURNS_PER_UNIT && program.motor_turns_per_unit().is_some()
-                || program.parameter(parameter).is_some_and(|held| held.from_drive.is_some())
-        };
-        self.signal.is_some_and(|signal| signal.is_command() || program.tells(signal))
-            || self.parameter.is_some_and(has)
+        self.is_carried(program)
+            || self.of_drive(program) != Fact::Absent
             || (self.is_zero_if_missing && program.has_parameters())
     }
 
-    /// What is known of it without asking the drive. `signal` gives the value that a signal has now.
-    pub fn fact(&self, program: &DriveProgram, signal: impl Fn(Signal) -> Option<i64>) -> Fact {
-        if let Some(value) = self.signal.and_then(signal) {
-            return Fact::Value(value);
-        }
+    /// Whether its signal is in the telegrams.
+    fn is_carried(&self, program: &DriveProgram) -> bool {
+        self.signal.is_some_and(|signal| signal.is_command() || program.tells(signal))
+    }
+
+    /// What is known of its parameter without asking the drive.
+    fn of_drive(&self, program: &DriveProgram) -> Fact {
         match self.parameter {
             Some(Parameter::MOTOR_TURNS_PER_UNIT) => {
                 program.motor_turns_per_unit().map_or(Fact::Absent, Fact::Value)
@@ -468,12 +466,20 @@ impl Read {
             Some(parameter) if program.parameter(parameter).is_some_and(|held| held.from_drive.is_some()) => {
                 Fact::Unknown
             }
-            _ if self.signal.is_some_and(|signal| signal.is_command() || program.tells(signal)) => {
-                Fact::Silent
-            }
-            // Of a drive whose loops nobody knows nothing is 0 for certain.
-            _ if self.is_zero_if_missing && !program.has_parameters() => Fact::Silent,
             _ => Fact::Absent,
+        }
+    }
+
+    /// What is known of it without asking the drive. `signal` gives the value that a signal has now.
+    pub fn fact(&self, program: &DriveProgram, signal: impl Fn(Signal) -> Option<i64>) -> Fact {
+        if let Some(value) = self.signal.and_then(signal) {
+            return Fact::Value(value);
+        }
+        match self.of_drive(program) {
+            Fact::Absent if self.is_carried(program) => Fact::Silent,
+            // Of a drive whose loops nobody knows nothing is 0 for certain.
+            Fact::Absent if self.is_zero_if_missing && !program.has_parameters() => Fact::Silent,
+            known => known,
         }
     }
 }

@@ -271,7 +271,7 @@ fn a_hookup_test_allocates_nothing() {
 /// A box with two CAN drives that has just been switched on.
 fn on_can_from_the_start(tamper: Option<TamperCan>) -> Rig {
     let configuration = include_str!("virtual_time/can.toml").to_owned();
-    let mut rig = Rig::new(Settings { configuration, drives: Vec::new(), ..Settings::default() });
+    let mut rig = Rig::new(Settings::without_line(configuration));
     rig.can[0].tamper = tamper;
     rig
 }
@@ -404,8 +404,7 @@ fn on_devicenet_from_the_start() -> Rig {
         configuration.split_once("[axis.limits]\nfollowing_error = 0.5\n").expect("the turntable's limits");
     let velocity_drive =
         format!("{head}{tail}").replace("mac_id = 5\nresolution = 1_048_576", "mac_id = 5\nkind = \"ac-dc\"");
-    let mut rig =
-        Rig::new(Settings { configuration: velocity_drive, drives: Vec::new(), ..Settings::default() });
+    let mut rig = Rig::new(Settings::without_line(velocity_drive));
     // The simulated drives make their explicit answers on the heap.
     rig.devicenet[0].aside = |run| opt_out(run);
     rig

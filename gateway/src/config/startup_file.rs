@@ -184,24 +184,15 @@ impl Loader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameter::backup::{Identity, Kept};
+    use crate::parameter::backup::Identity;
+    use crate::parameter::backup::tests::kept;
 
     /// Every key that `axisbridge param backup` writes is one that a list may have.
     #[test]
     fn what_a_backup_writes_is_a_list() {
         let drive = Identity([("device_id".to_owned(), "D-1".to_owned())].into());
-        let kept = Kept {
-            id: "S-0-0104".to_owned(),
-            name: "Position loop Kv-factor".to_owned(),
-            value: "1.50".to_owned(),
-            unit: "1000/min".to_owned(),
-            attribute: "0x02110001".to_owned(),
-            minimum: "0.01".to_owned(),
-            maximum: "655.35".to_owned(),
-            data: "9600".to_owned(),
-        };
         let backup =
-            Backup { parameter: vec![kept], ..Backup::new("turntable", "sercos", "S-0-0192", drive) };
+            Backup { parameter: vec![kept()], ..Backup::new("turntable", "sercos", "S-0-0192", drive) };
         let content = backup.to_text().expect("a text");
         let (source, mut findings) = (Source::new("a.toml", &content), Findings::default());
         let read = tree(&content, &source, &mut findings)

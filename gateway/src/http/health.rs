@@ -97,12 +97,13 @@ impl Heartbeat {
 
 #[cfg(test)]
 mod tests {
-    use super::super::view::tests::{installation, time};
+    use super::super::view::tests::installation;
     use super::*;
     use crate::status::tests::distinct;
+    use crate::time::status::tests::synchronized;
 
     fn health(status: &BoxStatus, age: u64) -> Health {
-        let overview = Overview::of(&installation(), status, &time());
+        let overview = Overview::of(&installation(), status, &synchronized());
         Health::of(status, Duration::from_millis(age), &overview)
     }
 

@@ -7,12 +7,13 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use super::server::HttpServer;
-use super::view::tests::{installation, time, view};
+use super::view::tests::{installation, view};
 use super::{RunningServer, openapi};
 use crate::latest::Publisher;
 use crate::local::overview::Overview;
 use crate::status::BoxStatus;
 use crate::status::tests::distinct;
+use crate::time::status::tests::synchronized;
 
 /// How long an answer may take on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -99,7 +100,7 @@ fn status_is_the_object_of_the_command_line() {
     let bench = Bench::start();
     let answer = bench.get("/api/v1/status");
     assert!(answer.code == 200 && answer.head.contains("content-type: application/json"), "{}", answer.head);
-    let expected = Overview::of(&installation(), &distinct(), &time());
+    let expected = Overview::of(&installation(), &distinct(), &synchronized());
     assert_eq!(answer.body, serde_json::to_string(&expected).unwrap());
 }
 

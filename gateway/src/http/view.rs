@@ -72,41 +72,25 @@ pub(super) mod tests {
     use crate::latest::{Publisher, latest};
     use crate::local::installation::tests::installation as names;
     use crate::status::tests::distinct;
-    use crate::time::judge::SyncPhase;
-    use crate::time::ptp::FollowerConfig;
-    use crate::time::status::TimeStatus;
+    use crate::time::status::tests::synchronized;
 
     /// The names of the gateway of [`distinct`], with a name that has to be escaped.
     pub fn installation() -> Installation {
         Installation { name: "cell \"4\"".to_owned(), ..names() }
     }
 
-    /// A synchronized clock, 120 ns off.
-    pub fn time() -> TimeStatus {
-        let follower =
-            FollowerConfig { identity: [1; 8], domain: 0, threshold: 10_000, asymmetry: 0, seed: 1 };
-        TimeStatus {
-            phase: SyncPhase::Synchronized,
-            grandmaster: Some([0x02, 0x41, 0x42, 0xFF, 0xFE, 0, 0, 1]),
-            offset_from_master: Some(-120),
-            mean_path_delay: Some(3_400),
-            error_bound: 800,
-            ..TimeStatus::ptp(&follower)
-        }
-    }
-
     /// A view of [`distinct`], and the end where another status can be published.
     pub fn view() -> (View, Publisher<BoxStatus>) {
         let (publisher, reader) = latest(distinct());
         let started = SystemTime::UNIX_EPOCH + Duration::from_millis(1_700_000_000_250);
-        (View::new(installation(), reader, TimeView::of(time()), started), publisher)
+        (View::new(installation(), reader, TimeView::of(synchronized()), started), publisher)
     }
 
     #[test]
     fn look_shows_the_status_that_was_published_last() {
         let (view, mut publisher) = view();
         let look = view.look();
-        assert_eq!(look.status, Overview::of(&installation(), &distinct(), &time()));
+        assert_eq!(look.status, Overview::of(&installation(), &distinct(), &synchronized()));
         assert!(look.health.alive && !look.health.ready);
         let mut next = distinct();
         next.axes[1] = next.axes[0];

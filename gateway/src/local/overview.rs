@@ -343,20 +343,10 @@ mod tests {
     use super::*;
     use crate::status::tests::distinct;
     use crate::time::judge::{Reason, SyncPhase};
-    use crate::time::ptp::FollowerConfig;
+    use crate::time::status::tests::synchronized;
 
     fn overview() -> Overview {
-        let follower =
-            FollowerConfig { identity: [1; 8], domain: 0, threshold: 10_000, asymmetry: 0, seed: 1 };
-        let time = TimeStatus {
-            phase: SyncPhase::Synchronized,
-            grandmaster: Some([0x02, 0x41, 0x42, 0xFF, 0xFE, 0, 0, 1]),
-            offset_from_master: Some(-120),
-            mean_path_delay: Some(3_400),
-            error_bound: 800,
-            ..TimeStatus::ptp(&follower)
-        };
-        Overview::of(&installation(), &distinct(), &time)
+        Overview::of(&installation(), &distinct(), &synchronized())
     }
 
     #[test]

@@ -210,16 +210,12 @@ impl Backup {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn identity(pairs: &[(&str, &str)]) -> Identity {
-        Identity(pairs.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect())
-    }
-
-    fn backup() -> Backup {
-        let drive = identity(&[("device_id", "D-1 \"x\""), ("vendor_code", "0x0539")]);
-        let kept = Kept {
+    /// A parameter with everything that a backup keeps of one.
+    pub fn kept() -> Kept {
+        Kept {
             id: "S-0-0104".to_owned(),
             name: "Position loop Kv-factor".to_owned(),
             value: "1.50".to_owned(),
@@ -228,10 +224,18 @@ mod tests {
             minimum: "0.01".to_owned(),
             maximum: "655.35".to_owned(),
             data: "9600".to_owned(),
-        };
+        }
+    }
+
+    fn identity(pairs: &[(&str, &str)]) -> Identity {
+        Identity(pairs.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect())
+    }
+
+    fn backup() -> Backup {
+        let drive = identity(&[("device_id", "D-1 \"x\""), ("vendor_code", "0x0539")]);
         let unread = Unread { id: "P-0-0001".to_owned(), why: "the drive refuses it".to_owned() };
         Backup {
-            parameter: vec![kept],
+            parameter: vec![kept()],
             unread: vec![unread],
             ..Backup::new("turntable", "sercos", "S-0-0192", drive)
         }

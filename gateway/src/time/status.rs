@@ -151,3 +151,22 @@ impl fmt::Display for TimeStatus {
         Ok(())
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A synchronized clock, 120 ns off.
+    pub fn synchronized() -> TimeStatus {
+        let follower =
+            FollowerConfig { identity: [1; 8], domain: 0, threshold: 10_000, asymmetry: 0, seed: 1 };
+        TimeStatus {
+            phase: SyncPhase::Synchronized,
+            grandmaster: Some([0x02, 0x41, 0x42, 0xFF, 0xFE, 0, 0, 1]),
+            offset_from_master: Some(-120),
+            mean_path_delay: Some(3_400),
+            error_bound: 800,
+            ..TimeStatus::ptp(&follower)
+        }
+    }
+}

@@ -394,9 +394,9 @@ fn a_row_of_some_modes_is_0_in_others_and_unknown_while_the_drive_moves_by_itsel
     let mut made = row(Operation::Sum(vec![A], vec![]), (1, 1), Rounding::Nearest);
     made.rows[0].modes = vec![OperatingMode::Position];
     let value = |control, facts: Known| made.value(&Known { control, ..facts });
-    assert_eq!(value(Control::Led(OperatingMode::Position), known(&[7])), Ok(7));
-    assert_eq!(value(Control::Led(OperatingMode::Position), Known::default()), Err(NoValue::Needs(0)));
-    for control in [Control::Led(OperatingMode::Velocity), Control::Off] {
+    assert_eq!(value(Control::Gateway(OperatingMode::Position), known(&[7])), Ok(7));
+    assert_eq!(value(Control::Gateway(OperatingMode::Position), Known::default()), Err(NoValue::Needs(0)));
+    for control in [Control::Gateway(OperatingMode::Velocity), Control::Off] {
         assert_eq!(value(control, Known::default()), Ok(0), "nothing is asked for: {control:?}");
     }
     assert_eq!(value(Control::Drive, known(&[7])), Err(NoValue::Mode));
@@ -510,10 +510,10 @@ fn shipped_values_that_need_each_other_are_refused() {
 fn shipped_rows_of_the_loops_come_out() {
     let mapping = shipped();
     let generic = &mapping.dictionaries.generic;
-    let led = Control::Led(OperatingMode::Position);
+    let control = Control::Gateway(OperatingMode::Position);
     let value = |name: &str, given: &[(&str, i64)]| {
         let computation = generic.computation(generic.parameter(name).unwrap().parameter).unwrap();
-        let mut known = Known { control: led, ..Known::default() };
+        let mut known = Known { control, ..Known::default() };
         for (fact, read) in known.facts.iter_mut().zip(&computation.reads) {
             let name = match read.signal {
                 Some(signal) => signal.name(),

@@ -130,6 +130,12 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// A box with this configuration and no SERCOS drives.
+    #[must_use]
+    pub fn without_line(configuration: impl Into<String>) -> Self {
+        Self { configuration: configuration.into(), drives: Vec::new(), ..Self::default() }
+    }
+
     /// [`FIXED_BOX`] and its one drive.
     #[must_use]
     pub fn fixed() -> Self {

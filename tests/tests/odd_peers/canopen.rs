@@ -53,8 +53,7 @@ fn run(mut oddities: Oddities, keys: &str, mode: ControlMode) -> Outcome {
     oddities.missing.push((0x6092, None));
     let turn = oddities.counts_per_turn;
     let drive = Rc::new(RefCell::new(CanDrive::new(oddities)));
-    let settings =
-        Settings { configuration: format!("{HEAD}{keys}\n"), drives: Vec::new(), ..Settings::default() };
+    let settings = Settings::without_line(format!("{HEAD}{keys}\n"));
     let mut rig = Rig::among(settings, vec![drive.clone()]);
     let mut left = 90;
     while left > 0 && rig.status().state != BoxState::READY || left > 85 {

@@ -176,7 +176,7 @@ fn twin(row: &Row) -> DriveNode {
 /// What becomes of a drive like that of the row: whether it is commissioned, moved as far as it has to, and what the box says of it.
 fn driven(row: &Row) -> (bool, Vec<String>) {
     let configuration = configuration(row);
-    let settings = Settings { configuration, drives: Vec::new(), ..Settings::default() };
+    let settings = Settings::without_line(configuration);
     let mut rig = Rig::new(settings);
     // It takes the counts of the drives that the rig makes, and these have those of their files.
     rig.motion_checker = MotionChecker::default();

@@ -51,8 +51,7 @@ const LIMITS: Limits = Limits { velocity: 1.0, acceleration: 4.0, jerk: 40.0 };
 /// Drives the peer, and says what became of it.
 fn run(oddities: Oddities, keys: &str, speed: bool) -> Outcome {
     let slave = Rc::new(RefCell::new(DevicenetSlave::new(oddities)));
-    let settings =
-        Settings { configuration: format!("{HEAD}{keys}\n"), drives: Vec::new(), ..Settings::default() };
+    let settings = Settings::without_line(format!("{HEAD}{keys}\n"));
     let mut rig = Rig::among(settings, vec![slave.clone()]);
     rig.run_for(axisbridge_tests::rig::motion::millis(6_000));
     let steps = match speed {

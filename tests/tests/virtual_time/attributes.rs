@@ -162,11 +162,7 @@ fn every_attribute_answers_as_its_row_in_the_dictionary_says() {
 /// Drives of SERCOS and CANopen brake within their torque limits: a Stopping Torque below either of them would have no effect.
 #[test]
 fn stopping_torque_is_kept_where_the_drive_never_uses_more_and_refused_otherwise() {
-    let can = Settings {
-        configuration: include_str!("can.toml").to_owned(),
-        drives: Vec::new(),
-        ..Settings::default()
-    };
+    let can = Settings::without_line(include_str!("can.toml"));
     for (bus, settings) in [("SERCOS", Settings::default()), ("CANopen", can)] {
         let mut rig = Rig::ready(settings);
         rig.connect(vec![Step::Dwell { seconds: 1_000.0 }]);

@@ -11,7 +11,7 @@ use profile_generic::image::FeedbackSet;
 const BOX: &str = include_str!("can.toml");
 
 fn settings() -> Settings {
-    Settings { configuration: BOX.to_owned(), drives: Vec::new(), ..Settings::default() }
+    Settings::without_line(BOX)
 }
 
 /// The same with a key of the turntable's drive.

@@ -24,7 +24,7 @@ fn settings(device: &str, more: &str) -> Settings {
     let drive = "name = \"drive-a\"\nnode = 1\n";
     assert!(BOX.contains(drive));
     let text = BOX.replace(drive, &format!("{drive}{more}\n[[south.can.device]]\nnode = 1\n{device}\n"));
-    Settings { configuration: text, drives: Vec::new(), ..Settings::default() }
+    Settings::without_line(text)
 }
 
 fn node(rig: &mut Rig, device: usize) -> &mut Node<Device> {

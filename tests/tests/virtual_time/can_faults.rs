@@ -55,7 +55,7 @@ fn turn() -> Step {
 }
 
 fn settings() -> Settings {
-    Settings { configuration: BOX.to_owned(), drives: Vec::new(), ..Settings::default() }
+    Settings::without_line(BOX)
 }
 
 /// The slide goes far enough for what follows: `seconds`, and then turning the turntable again for a while.

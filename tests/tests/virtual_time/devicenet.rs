@@ -34,7 +34,7 @@ fn settings() -> Settings {
 }
 
 fn with(configuration: &str) -> Settings {
-    Settings { configuration: configuration.to_owned(), drives: Vec::new(), ..Settings::default() }
+    Settings::without_line(configuration)
 }
 
 /// The box with a velocity drive of the AC/DC drive profile on the turntable.

@@ -52,8 +52,7 @@ impl Bench {
 
     pub(super) fn canopen(more: &str, prepare: impl FnOnce(&mut Rig)) -> Self {
         let configuration = format!("{}{more}", include_str!("can.toml"));
-        let settings =
-            Settings { configuration: configuration.clone(), drives: Vec::new(), ..Settings::default() };
+        let settings = Settings::without_line(configuration.clone());
         let mut rig = Rig::new(settings);
         prepare(&mut rig);
         Self::new(rig, &configuration)
@@ -342,8 +341,7 @@ fn nothing_is_written_while_a_drive_holds_an_axis_with_torque_that_nobody_contro
 #[test]
 fn nothing_is_written_while_somebody_controls_the_other_axis_of_the_same_device() {
     let configuration = include_str!("can.toml").replace("node = 2", "node = 1\naxis = 1");
-    let settings =
-        Settings { configuration: configuration.clone(), drives: Vec::new(), ..Settings::default() };
+    let settings = Settings::without_line(configuration.clone());
     let mut bench = Bench::new(Rig::new(settings), &configuration);
     assert_eq!(bench.object("write slide 6881h 500")["value"], "500", "nobody controls either");
     bench.enable();

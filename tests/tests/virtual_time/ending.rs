@@ -117,18 +117,8 @@ fn an_end_without_faults_tells_of_none() {
     let devicenet = include_str!("devicenet.toml");
     for (name, mut rig) in [
         ("SERCOS", Rig::ready(Settings::default())),
-        (
-            "CANopen",
-            Rig::ready(Settings { configuration: can.to_owned(), drives: Vec::new(), ..Settings::default() }),
-        ),
-        (
-            "DeviceNet",
-            Rig::ready(Settings {
-                configuration: devicenet.to_owned(),
-                drives: Vec::new(),
-                ..Settings::default()
-            }),
-        ),
+        ("CANopen", Rig::ready(Settings::without_line(can))),
+        ("DeviceNet", Rig::ready(Settings::without_line(devicenet))),
     ] {
         rig.run_for(millis(500));
         stop(&mut rig);

@@ -38,7 +38,7 @@ fn turntable(actual_values: &str, polarity: i64, stops: bool) -> Rig {
     let configuration = include_str!("can.toml");
     assert!(configuration.contains(drive));
     let configuration = configuration.replace(drive, &format!("{drive}actual_values = [{actual_values}]\n"));
-    let mut rig = Rig::new(Settings { configuration, drives: Vec::new(), ..Settings::default() });
+    let mut rig = Rig::new(Settings::without_line(configuration));
     let node = rig.can[0].bus.nodes_mut().next().expect("the turntable");
     node.dictionary_mut().set(0x607E, 0, polarity);
     node.dictionary_mut().store(Group::All);

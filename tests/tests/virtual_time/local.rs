@@ -374,7 +374,7 @@ fn the_end_of_the_box_ends_local_control() {
 fn a_canopen_drive_positions_and_homes_by_itself() {
     let modes = "node = 1\nmodes = [\"position\", \"positioning\", \"homing\"]";
     let configuration = include_str!("can.toml").replacen("node = 1", modes, 1);
-    let rig = Rig::ready(Settings { configuration, drives: Vec::new(), ..Settings::default() });
+    let rig = Rig::ready(Settings::without_line(configuration));
     let mut bench = Bench::on(rig);
     let actual = |bench: &Bench| {
         *bench.rig.can[0].bus.nodes().next().expect("a device").application().axes()[0].actual()

@@ -63,7 +63,7 @@ const TORQUES: [u16; 4] =
     [id::TORQUE_REFERENCE, id::TORQUE_REFERENCE_FILTERED, id::TORQUE_REFERENCE_LIMITED, id::IQ_COMMAND];
 
 fn settings(configuration: &str) -> Settings {
-    Settings { configuration: configuration.to_owned(), drives: Vec::new(), ..Settings::default() }
+    Settings::without_line(configuration)
 }
 
 /// A rig whose controller carries out these steps, with a client of its own.

@@ -45,7 +45,7 @@ mod id {
 }
 
 fn settings(configuration: &str) -> Settings {
-    Settings { configuration: configuration.to_owned(), drives: Vec::new(), ..Settings::default() }
+    Settings::without_line(configuration)
 }
 
 /// A rig whose axes stand, with a client of their device.

@@ -53,7 +53,7 @@ fn sercos(keys: &str, entries: &[String]) -> Settings {
 fn can(keys: &str, entries: &[String]) -> Settings {
     let drive = "name = \"drive-a\"\nnode = 1\n";
     let configuration = with(include_str!("can.toml"), drive, "can", keys, &entries.concat());
-    Settings { configuration, drives: Vec::new(), ..Settings::default() }
+    Settings::without_line(configuration)
 }
 
 fn devicenet(keys: &str, entries: &[String]) -> Settings {
@@ -65,7 +65,7 @@ fn devicenet(keys: &str, entries: &[String]) -> Settings {
     let keys = format!("{resolution}{keys}");
     let configuration =
         with(&configuration.replacen(&rest, drive, 1), drive, "devicenet", &keys, &entries.concat());
-    Settings { configuration, drives: Vec::new(), ..Settings::default() }
+    Settings::without_line(configuration)
 }
 
 /// An attribute of the Motion Device Axis Object of the first drive, a REAL.

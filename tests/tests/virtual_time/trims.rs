@@ -263,7 +263,7 @@ fn a_canopen_drive_adds_the_offsets_that_its_configuration_names() {
         let configuration = include_str!("can.toml");
         assert!(configuration.contains(drive));
         let configuration = configuration.replace(drive, &format!("{drive}offsets = [{offsets}]\n"));
-        let mut rig = Rig::ready(Settings { configuration, drives: Vec::new(), ..Settings::default() });
+        let mut rig = Rig::ready(Settings::without_line(configuration));
         rig.connect(vec![
             lists((0, 0.0, 0.0)),
             Step::Enable(turntable()),

@@ -258,8 +258,7 @@ impl Bench {
 #[test]
 fn attributes_are_what_the_table_of_truths_says() {
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
-    let settings =
-        |text: &str| Settings { configuration: text.to_owned(), drives: Vec::new(), ..Settings::default() };
+    let settings = |text: &str| Settings::without_line(text);
     let mut cells: BTreeMap<u16, Vec<String>> = BTreeMap::new();
     let mut counts = Vec::new();
     for (bus, settings) in BUSES.into_iter().zip([

@@ -18,11 +18,12 @@ use crate::engine::build::sercos::master_config;
 use crate::engine::port::EthernetPort;
 use crate::mapping::Mapping;
 use crate::parameter::known::Catalogue;
-use crate::runner::port::PacketPort;
+use crate::runner::port::{PacketPort, PortError};
 use crate::runner::{StartError, can_port};
 use crate::simulate::can_bus::InProcessCan;
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
 use crate::sys::clock;
+use crate::sys::interface_lock::LockError;
 
 /// Longest sleep: frames come at any time.
 const PATIENCE: DurationNs = DurationNs::from_millis(1);
@@ -89,7 +90,8 @@ fn line(config: &Config, axis: &Axis) -> Result<Box<dyn Line>, CliError> {
             let (sercos, drive) = both.ok_or("expected [south.sercos] in the configuration")?;
             let (port, mac): (Box<dyn EthernetPort>, _) = match &sercos.link {
                 Wire::Interface { name, ring } => {
-                    let port = PacketPort::open(name, ring.as_deref()).map_err(|error| occupied(&error))?;
+                    let port = PacketPort::open(name, ring.as_deref())
+                        .map_err(|error| no_port(&StartError::Interface(error)))?;
                     let mac = port.mac();
                     (Box::new(port), mac)
                 }
@@ -107,7 +109,7 @@ fn line(config: &Config, axis: &Axis) -> Result<Box<dyn Line>, CliError> {
             let port = can_port(&can.link, can.bit_rate, &mut watches, None, |tap| {
                 Box::new(InProcessCan::of(can, tap).in_host_time(can.cycle_time))
             });
-            let port = port.map_err(|error: StartError| occupied(&error))?;
+            let port = port.map_err(|error| no_port(&error))?;
             let axes = can.drives.iter().filter(|other| other.node == drive.node).map(|other| other.axis);
             Ok(Box::new(CanLine::new(port, drive.node, axes)))
         }
@@ -120,12 +122,13 @@ fn line(config: &Config, axis: &Axis) -> Result<Box<dyn Line>, CliError> {
 }
 
 /// Why an interface cannot be used; of one that has a master, what to do.
-fn occupied(error: &dyn std::error::Error) -> CliError {
-    let text = error.to_string();
-    let hint = if text.contains("has a master already") {
-        "\nif that is a gateway, leave out --alone: it gives access to its drives (--local SOCKET)"
-    } else {
-        ""
+fn no_port(error: &StartError) -> CliError {
+    let hint = match error {
+        StartError::Lock(LockError::Held { .. })
+        | StartError::Interface(PortError::Lock(LockError::Held { .. })) => {
+            "\nif that is a gateway, leave out --alone: it gives access to its drives (--local SOCKET)"
+        }
+        _ => "",
     };
-    format!("{text}{hint}").into()
+    format!("{error}{hint}").into()
 }

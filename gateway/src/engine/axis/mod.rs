@@ -292,17 +292,17 @@ impl AxisChannel {
         }
     }
 
-    /// What leads the axis, for what follows from its loops.
+    /// What controls the axis, for what follows from its loops.
     #[must_use]
     pub fn control(&self) -> Control {
         let state = self.state();
-        let led = state == DriveState::Operating && self.drive.action == Action::Enable;
+        let follows = state == DriveState::Operating && self.drive.action == Action::Enable;
         match self.command.selection() {
             _ if !state.may_have_torque() => Control::Off,
             ModeSelection { mode, interpolation: InterpolationSource::Controller }
-                if led && mode != OperatingMode::Homing =>
+                if follows && mode != OperatingMode::Homing =>
             {
-                Control::Led(mode)
+                Control::Gateway(mode)
             }
             _ => Control::Drive,
         }

@@ -5,7 +5,7 @@ use profile_cia402::wire::Mux;
 use profile_generic::time::DurationNs;
 
 use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
-use crate::mapping::Object;
+use crate::parameter::command::signature;
 
 /// Longest time for the answer to a write that stores parameters or restores the defaults: pages of a memory are erased before.
 const STORE_TIME: DurationNs = DurationNs::from_secs(10);
@@ -16,13 +16,14 @@ const STORE_TIME: DurationNs = DurationNs::from_secs(10);
 /// CANopen devices do not have what is accessed.
 pub fn request(task: DirectTask) -> Result<SdoRequest, NotBegun> {
     let DirectTask { target, write, data } = task;
-    let Target::Object(Object { index, sub }) = target else { return Err((DirectFailure::OtherBus, data)) };
-    let object = Mux::new(index, sub);
-    Ok(match (write, index) {
-        (true, 0x1010 | 0x1011) => SdoRequest::download(object, SdoData::Buffer(data)).within(STORE_TIME),
-        (true, _) => SdoRequest::download(object, SdoData::Buffer(data)),
-        (false, _) => SdoRequest::upload_into(object, data),
-    })
+    let Target::Object(object) = target else { return Err((DirectFailure::OtherBus, data)) };
+    let mux = Mux::new(object.index, object.sub);
+    if !write {
+        return Ok(SdoRequest::upload_into(mux, data));
+    }
+    let request = SdoRequest::download(mux, SdoData::Buffer(data));
+    let is_command = signature(object).is_some();
+    Ok(if is_command { request.within(STORE_TIME) } else { request })
 }
 
 /// What the outcome says.
