@@ -49,6 +49,8 @@ fn a_second_master_on_an_interface_is_refused_and_told_who_has_it() {
             assert!(begin.elapsed() < Duration::from_secs(10), "at once");
             let expected = format!("`sercos0` has a master already: process {} (`axisbridge run", first.id());
             assert!(said.contains(&expected), "expected {expected:?}, got {said}");
+            let is_alone = second.contains(&"--alone");
+            assert_eq!(said.contains("leave out --alone"), is_alone, "what to do: {said}");
         }
         assert!(first.ended().is_none());
         let text = text("masters-first");
