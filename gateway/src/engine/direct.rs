@@ -19,7 +19,7 @@ use super::axis::{AxisChannel, Owner};
 use super::bus::{Buses, can, devicenet, sercos};
 use super::local::ClientId;
 use super::north::Exchange;
-use crate::mapping::Object;
+use crate::mapping::{Item, Object};
 
 /// Length of the queues of requests and of answers.
 const QUEUE_LEN: usize = 16;
@@ -45,6 +45,18 @@ pub enum Target {
         /// Number of the attribute.
         attribute: u16,
     },
+}
+
+impl Target {
+    /// The value of the drive that it is; `None` for what describes one, and for another instance than the axis itself.
+    fn item(self) -> Option<Item> {
+        match self {
+            Self::Element(idn, Element::Data) => Some(Item::Idn(idn)),
+            Self::Object(object) => Some(Item::Object(object)),
+            Self::Attribute { class, instance: 1, attribute } => Some(Item::attribute(class, attribute)),
+            Self::Element(..) | Self::Status(_) | Self::Attribute { .. } => None,
+        }
+    }
 }
 
 /// Whether a target is read or written.
@@ -244,20 +256,25 @@ impl DirectNorth {
     }
 
     /// Answers the access that has ended, and begins the next one.
-    pub(super) fn exchange(&mut self, exchange: &mut Exchange<'_>, buses: &mut Buses) {
+    /// Gives what a drive was asked to take.
+    pub(super) fn exchange(
+        &mut self,
+        exchange: &mut Exchange<'_>,
+        buses: &mut Buses,
+    ) -> Option<(usize, Item)> {
         let (now, system) = (exchange.now, exchange.system());
         let Exchange { ending, ref mut axes, .. } = *exchange;
         // A buffer is freed by who has made it: nothing is taken that cannot be answered.
         if self.answers.is_full() {
-            return;
+            return None;
         }
         if let Some(Active { client, id, axis }) = self.active {
-            let Some(DirectResult { result, data }) = buses.take_direct(axis) else { return };
+            let DirectResult { result, data } = buses.take_direct(axis)?;
             self.active = None;
             let _ = self.answers.push(DirectAnswer { client, id, result, data });
-            return;
+            return None;
         }
-        let Ok(request) = self.requests.pop() else { return };
+        let request = self.requests.pop().ok()?;
         let DirectRequest { client, id, axis, target, direction, data } = request;
         let axis = usize::from(axis);
         let begun = match refusal(axis, direction, axes, ending, buses) {
@@ -267,10 +284,11 @@ impl DirectNorth {
                 buses.begin_direct(axis, DirectTask { target, write, data })
             }
         };
+        // Before it is known whether the drive takes it: a lost answer is no sign that it does not.
+        let written = target.item().filter(|_| begun.is_ok() && direction != Direction::Read);
         match begun {
             Ok(()) => {
                 self.active = Some(Active { client, id, axis });
-                // Before it is known whether the drive takes it: a lost answer is no sign that it does not.
                 if direction == (Direction::Write { rescales: true }) {
                     let sharing = axes.iter_mut().enumerate();
                     sharing
@@ -282,6 +300,7 @@ impl DirectNorth {
                 let _ = self.answers.push(DirectAnswer { client, id, result: Err(failure), data });
             }
         }
+        written.map(|item| (axis, item))
     }
 }
 

@@ -358,8 +358,10 @@ impl Engine {
         if let Some(registers) = registers {
             registers.exchange(mapping, (exchange.axes, exchange.ending), buses);
         }
-        if let Some(direct) = direct {
-            direct.exchange(&mut exchange, buses);
+        if let Some(direct) = direct
+            && let Some((axis, item)) = direct.exchange(&mut exchange, buses)
+        {
+            devices.iter_mut().for_each(|device| device.set_by_others(axis, item));
         }
         for channel in devices {
             channel.exchange(&mut exchange);
@@ -462,15 +464,17 @@ fn hand_on(
     let data = answer.result.as_ref().map(|(data, _)| data.as_slice()).map_err(|failure| *failure);
     let axis = &mut axes[answer.axis];
     match answer.purpose {
-        Purpose::Attribute { .. } => {
+        Purpose::Attribute { .. } | Purpose::Original { .. } => {
             norths.devices.iter_mut().any(|channel| channel.answer(&answer, axes, notice));
         }
         Purpose::LocalParameter(ticket) => {
+            note_set(norths.devices, answer.axis, &answer);
             if let Some(local) = norths.local {
                 local.parameter_answered(ticket, &answer, axis);
             }
         }
         Purpose::RegisterParameter(ticket) => {
+            note_set(norths.devices, answer.axis, &answer);
             if let Some(registers) = norths.registers {
                 registers.answered(ticket, &answer, axis);
             }
@@ -488,6 +492,13 @@ fn hand_on(
         }
         // Whether it helped shows in the drive's status word.
         Purpose::FaultReset => {}
+    }
+}
+
+/// Somebody besides a controller has written to a drive: a write has no data in its answer.
+fn note_set(devices: &mut [DeviceChannel], axis: usize, answer: &Answer) {
+    if answer.result.as_ref().is_ok_and(|(data, _)| data.is_empty()) {
+        devices.iter_mut().for_each(|device| device.set_by_others(axis, answer.item));
     }
 }
 

@@ -22,6 +22,7 @@ use profile_sercos::master::topology::Topology;
 use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
 
+use super::access::AccessFailure;
 use super::admission::Refused;
 use super::axis::{DiagnosticMessage, Loss, PositionJump, Trip};
 use super::bus::BusName;
@@ -35,7 +36,7 @@ use super::bus::startup::{StartupFailure, StartupReport};
 use super::device::scaling::ScalingRefusal;
 use super::phase_lock::{LockState, Phase as LockPhase};
 use crate::mapping::{
-    Cia402Error, Difference, DriveIdentity, InterpolationPeriod, Number, Object, SercosError,
+    Cia402Error, Difference, DriveIdentity, InterpolationPeriod, Item, Number, Object, SercosError,
 };
 use crate::status::AxisWait;
 
@@ -365,6 +366,15 @@ pub enum Notice {
         /// What the drive has.
         held: Option<Number>,
     },
+    /// The drive did not take back what it had before the last controller: it keeps what that has set.
+    NotReturned {
+        /// Number of the axis.
+        axis: u8,
+        /// What it keeps.
+        item: Item,
+        /// Why.
+        failure: AccessFailure,
+    },
     /// The scaling attributes of the controller make no sense; the axis stays out of operation.
     Scaling {
         /// Number of the axis: its place in the configuration, from 0.
@@ -471,6 +481,7 @@ impl Notice {
             | Self::DriveSays { axis, .. }
             | Self::Logged { axis, .. }
             | Self::NotEqual { axis, .. }
+            | Self::NotReturned { axis, .. }
             | Self::Scaling { axis, .. } => Some(*axis),
         }
     }
@@ -598,6 +609,13 @@ impl fmt::Display for Notice {
             }
             Self::NotEqual { attribute, .. } => {
                 write!(f, "attribute {attribute} is not what the drive has, and only the drive can change that")
+            }
+            Self::NotReturned { item, failure, .. } => {
+                let why = match failure {
+                    AccessFailure::Refused(_) => "the drive refuses it",
+                    AccessFailure::Unanswered => "the drive does not answer",
+                };
+                write!(f, "{item} keeps what the last controller has set, instead of what the drive had before: {why}")
             }
             Self::Scaling { error, .. } => write!(f, "the controller's scaling cannot be used: {error}"),
         }

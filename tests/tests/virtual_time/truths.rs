@@ -20,9 +20,9 @@ use profile_sercos::wire::idn::Idn;
 
 const ACCEPT: &str = "AXISBRIDGE_ACCEPT";
 
-const GET: u8 = 0x0E;
-const SET: u8 = 0x10;
-const OK: u8 = 0;
+pub(super) const GET: u8 = 0x0E;
+pub(super) const SET: u8 = 0x10;
+pub(super) const OK: u8 = 0;
 const INVALID_VALUE: u8 = 0x09;
 const NOT_SETTABLE: u8 = 0x0E;
 const DEVICE_CONFLICT: u8 = 0x10;
@@ -39,9 +39,9 @@ fn attribute_place(id: u16) -> String {
 }
 
 /// What the drive of the first axis holds: bytes by the name of their place.
-type Held = BTreeMap<String, Vec<u8>>;
+pub(super) type Held = BTreeMap<String, Vec<u8>>;
 
-fn held(rig: &Rig) -> Held {
+pub(super) fn held(rig: &Rig) -> Held {
     if let Some(wire) = rig.can.first() {
         let node = wire.bus.nodes().next().expect("a drive");
         let entries = node.dictionary().entries().iter();
@@ -83,7 +83,7 @@ fn put(rig: &mut Rig, place: &str, bytes: &[u8]) {
 }
 
 /// Places whose content is another one now.
-fn changed(before: &Held, after: &Held) -> BTreeSet<String> {
+pub(super) fn changed(before: &Held, after: &Held) -> BTreeSet<String> {
     after
         .iter()
         .filter(|(place, bytes)| before.get(*place) != Some(bytes))
@@ -92,7 +92,7 @@ fn changed(before: &Held, after: &Held) -> BTreeSet<String> {
 }
 
 /// Another value of an attribute, near the one that it has; `None` for what is no number.
-fn another(row: &CipAttribute, value: &[u8]) -> Option<Vec<u8>> {
+pub(super) fn another(row: &CipAttribute, value: &[u8]) -> Option<Vec<u8>> {
     if row.length.is_some() || row.data_type == CipType::ShortString {
         return None;
     }
@@ -122,16 +122,16 @@ fn is_near(row: &CipAttribute, now: &[u8], before: &[u8], wanted: &[u8]) -> bool
 }
 
 /// A box whose axes stand, with a client of its first device.
-struct Bench {
+pub(super) struct Bench {
     name: &'static str,
-    rig: Rig,
+    pub(super) rig: Rig,
     client: Client,
     /// Places of the drive that change by themselves.
     alive: BTreeSet<String>,
 }
 
 impl Bench {
-    fn start(name: &'static str, settings: Settings) -> Self {
+    pub(super) fn start(name: &'static str, settings: Settings) -> Self {
         let mut rig = Rig::ready(settings);
         rig.connect(vec![Step::Dwell { seconds: 100_000.0 }]);
         rig.run_until(millis(20_000), "Stopped", |rig| {
@@ -149,12 +149,12 @@ impl Bench {
         Self { name, rig, client, alive }
     }
 
-    fn ask(&mut self, service: u8, id: u16, value: &[u8]) -> (u8, Vec<u8>) {
+    pub(super) fn ask(&mut self, service: u8, id: u16, value: &[u8]) -> (u8, Vec<u8>) {
         self.client.ask(&mut self.rig, service, 1, Some(id), value)
     }
 
     /// The same, and the places of the drive that it has changed.
-    fn set(&mut self, id: u16, value: &[u8]) -> (u8, BTreeSet<String>) {
+    pub(super) fn set(&mut self, id: u16, value: &[u8]) -> (u8, BTreeSet<String>) {
         let before = held(&self.rig);
         let (status, _) = self.ask(SET, id, value);
         let mut places = changed(&before, &held(&self.rig));

@@ -41,6 +41,13 @@ pub enum Purpose {
         /// Whether it is a write access.
         write: bool,
     },
+    /// What a drive has before a controller's first write, or its way back there.
+    Original {
+        /// Index in the box of the device of the axis.
+        device: u8,
+        /// It goes back.
+        write: bool,
+    },
     /// Local control's access to a parameter, by its ticket.
     LocalParameter(u32),
     /// A register's access to a parameter, by its ticket.

@@ -7,6 +7,7 @@ use profile_cip::wire::status::GeneralStatus;
 use profile_generic::parameter::Parameter;
 use profile_generic::state::Report;
 
+use super::originals::Originals;
 use super::refusal::{parameter_refusal, refusal};
 use super::scaling::signal_octets;
 use super::stopping_torque::{self, Comparison};
@@ -16,8 +17,8 @@ use crate::engine::bus::{Answer, Buses, Purpose};
 use crate::engine::notice::Notice;
 use crate::engine::parameter::{ParameterJob, ParameterJobs};
 use crate::mapping::{
-    self, AttributeEntry, AttributeTable, Backing, Mapping, MechanicalFact, Missing, Number, ParameterEntry,
-    SequenceAttributes,
+    self, AttributeEntry, AttributeTable, Backing, Item, Mapping, MechanicalFact, Missing, Number,
+    ParameterEntry, SequenceAttributes,
 };
 
 /// Writes to the drive that may be under way for one axis.
@@ -35,6 +36,8 @@ pub(super) struct Accesses {
     confirmations: ArrayVec<(u32, ArrayVec<u8, 8>), WRITES_MAX>,
     /// Values that are computed from what the drive has, and signals that are in no telegram.
     computed: ParameterJobs<Computed>,
+    /// What the drive had before a controller changed it.
+    originals: Originals,
 }
 
 /// An access to a computed value.
@@ -114,6 +117,10 @@ impl Accesses {
             AccessOperation::Read(_) => (Access::read(held.item), false),
             AccessOperation::Write(bytes) => (on.write(&entry, bytes, parameter, held)?, true),
         };
+        let (number, purpose) = (on.axis_number, on.original(false));
+        if !self.originals.ask_before(&request, |before| buses.access(number, before, purpose)) {
+            return Err(on.unasked());
+        }
         on.ask(access, &request, write, buses)?;
         self.note_write(access, &mapping.cip.sequence);
         Ok(())
@@ -160,16 +167,21 @@ impl Accesses {
     /// Asks the drive for what computed values need next, and answers the controller with those that are known.
     pub fn advance(&mut self, on: &mut Accessed<'_>, buses: &mut Buses, mapping: &Mapping) {
         let Accessed { number, axis_number, attributes, axis, .. } = *on;
+        self.give_back(on, buses);
+        let original = on.original(false);
         let device = &mut *on.device;
+        let originals = &mut self.originals;
         self.computed.advance(
             |_, job| job.next(mapping, axis),
             |what, request| {
                 let Computed { ticket, attribute, write } = *what;
-                buses.access(
-                    axis_number,
-                    request,
-                    Purpose::Attribute { ticket, device: number, attribute, write },
-                )
+                let ask = |before: &Access| buses.access(axis_number, before, original);
+                originals.ask_before(request, ask)
+                    && buses.access(
+                        axis_number,
+                        request,
+                        Purpose::Attribute { ticket, device: number, attribute, write },
+                    )
             },
             |what, result| {
                 let mut bytes = [0; 8];
@@ -181,6 +193,45 @@ impl Accesses {
                 device.complete_attribute(what.ticket, answer.map(|len| &bytes[..len]));
             },
         );
+    }
+
+    /// A connection was opened: what the last one has changed in the drive goes back.
+    pub fn opened(&mut self) {
+        self.originals.give_back();
+    }
+
+    /// Whether the drive still takes back what it had.
+    pub fn is_returning(&self) -> bool {
+        self.originals.is_returning()
+    }
+
+    /// The value of an item is what the drive has by itself: somebody else has set it.
+    pub fn set_by_others(&mut self, item: Item) {
+        self.originals.forget(item);
+    }
+
+    fn give_back(&mut self, on: &Accessed<'_>, buses: &mut Buses) {
+        if on.is_gone() {
+            self.originals.forget_all();
+        } else if !on.axis.may_have_torque() {
+            let (number, purpose) = (on.axis_number, on.original(true));
+            self.originals.advance(|request| buses.access(number, request, purpose));
+        }
+    }
+
+    /// Takes the drive's answer to what it had, or takes back.
+    pub fn original_answered(&mut self, answer: &Answer, write: bool, notice: &mut dyn FnMut(Notice)) {
+        let result = answer.result.as_ref().map(|(data, _)| data).map_err(|failure| *failure);
+        match (write, result) {
+            (false, result) => self.originals.read(answer.item, result),
+            (true, result) => {
+                self.originals.written();
+                if let Err(failure) = result {
+                    let axis = u8::try_from(answer.axis).unwrap_or(u8::MAX);
+                    notice(Notice::NotReturned { axis, item: answer.item, failure });
+                }
+            }
+        }
     }
 
     /// Compares a Stopping Torque with the drive's torque limits. A comparison in progress is overtaken, or its drive was lost.
@@ -275,11 +326,25 @@ impl Accessed<'_> {
     ) -> Result<(), GeneralStatus> {
         let (ticket, attribute) = (access.ticket, access.id);
         let purpose = Purpose::Attribute { ticket, device: self.number, attribute, write };
-        if buses.access(self.axis_number, request, purpose) {
-            return Ok(());
+        if buses.access(self.axis_number, request, purpose) { Ok(()) } else { Err(self.unasked()) }
+    }
+
+    /// The purpose of an access to what the drive has by itself.
+    fn original(&self, write: bool) -> Purpose {
+        Purpose::Original { device: self.number, write }
+    }
+
+    fn is_gone(&self) -> bool {
+        self.axis.feedback().report == Report::Silent
+    }
+
+    /// Why the drive was not asked.
+    fn unasked(&self) -> GeneralStatus {
+        if self.is_gone() {
+            GeneralStatus::DEVICE_STATE_CONFLICT
+        } else {
+            GeneralStatus::RESOURCE_UNAVAILABLE
         }
-        let is_gone = self.axis.feedback().report == Report::Silent;
-        Err(if is_gone { GeneralStatus::DEVICE_STATE_CONFLICT } else { GeneralStatus::RESOURCE_UNAVAILABLE })
     }
 
     /// Whether the drive has the value that the controller would set.

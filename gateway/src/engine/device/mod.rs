@@ -3,6 +3,7 @@
 mod access;
 mod axis;
 mod member;
+mod originals;
 mod reactions;
 mod refusal;
 pub mod scaling;
@@ -32,7 +33,7 @@ use super::north::{Exchange, North};
 use super::notice::Notice;
 use super::phase_lock::Grid;
 use super::port::{FRAME_MAX, NorthPort};
-use crate::mapping::{CipProgram, Mapping};
+use crate::mapping::{CipProgram, Item, Mapping};
 use crate::north::DeviceEnd;
 
 /// Attribute accesses handled in one cycle; the rest waits for the next.
@@ -279,6 +280,7 @@ impl DeviceChannel {
             return;
         }
         for (place, member) in self.members.iter_mut().enumerate() {
+            member.accesses.opened();
             member.preset_scaling(mapping, &mut self.device, place, axes);
         }
     }
@@ -291,7 +293,8 @@ impl DeviceChannel {
         buses: &mut Buses,
         notice: &mut dyn FnMut(Notice),
     ) {
-        for _ in 0..ACCESSES_PER_CYCLE {
+        let is_returning = self.members.iter().any(|member| member.accesses.is_returning());
+        for _ in 0..if is_returning { 0 } else { ACCESSES_PER_CYCLE } {
             let Some(access) = self.device.poll_attribute_access() else { break };
             let place = usize::from(access.instance).checked_sub(1);
             let begun = place.ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED).and_then(|place| {
@@ -309,9 +312,18 @@ impl DeviceChannel {
         }
     }
 
-    /// Takes the drive's answer to an attribute access; `false` when it is another device's.
+    /// Somebody else has set an item of the drive of this axis.
+    pub fn set_by_others(&mut self, axis: usize, item: Item) {
+        if let Some(member) = self.members.iter_mut().find(|member| member.axis == axis) {
+            member.accesses.set_by_others(item);
+        }
+    }
+
+    /// Takes the drive's answer to an access for an attribute; `false` when it is another device's.
     pub fn answer(&mut self, answer: &Answer, axes: &[AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
-        let Purpose::Attribute { ticket, device, attribute, write } = answer.purpose else { return false };
+        let (Purpose::Attribute { device, .. } | Purpose::Original { device, .. }) = answer.purpose else {
+            return false;
+        };
         if device != self.number {
             return false;
         }
@@ -320,8 +332,14 @@ impl DeviceChannel {
         let Some((place, member)) = members.find(|(_, member)| member.axis == answer.axis) else {
             return false;
         };
-        let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-        accesses.answer(&mut on, answer, (ticket, attribute, write), notice);
+        match answer.purpose {
+            Purpose::Attribute { ticket, attribute, write, .. } => {
+                let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
+                accesses.answer(&mut on, answer, (ticket, attribute, write), notice);
+            }
+            Purpose::Original { write, .. } => member.accesses.original_answered(answer, write, notice),
+            _ => {}
+        }
         true
     }
 

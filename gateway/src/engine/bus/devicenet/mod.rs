@@ -45,7 +45,7 @@ use crate::mapping::{DriveProgram, Item, Mapping};
 const POLL: ConnectionKind = ConnectionKind::Poll;
 
 /// Accesses of one axis that wait for an answer at the same time.
-const ACCESSES_MAX: usize = 2;
+const ACCESSES_MAX: usize = 4;
 
 /// Where a drive is on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -426,7 +426,7 @@ fn reply(
     let Item::Attribute(attribute) = item else {
         return Err(crate::engine::access::AccessFailure::Unanswered);
     };
-    if matches!(purpose, Purpose::Attribute { write: true, .. }) {
+    if matches!(purpose, Purpose::Attribute { write: true, .. } | Purpose::Original { write: true, .. }) {
         access::written(attribute, outcome)?;
         return Ok((Data::new(), Progress::None));
     }

@@ -1,0 +1,102 @@
+//! A connection begins with the defaults of all attributes (CIP Volume 9, 5-2.4): what a controller has changed in a drive does not
+//! outlive its connection.
+
+use std::collections::BTreeSet;
+
+use axisbridge::config::Config;
+use axisbridge::mapping::{Access, Mapping, Truth};
+use axisbridge::translate::Stage;
+use axisbridge_tests::rig::motion::millis;
+use axisbridge_tests::rig::{Rig, Settings};
+use profile_cip::controller::Step;
+use profile_cip::device::axis_state::AxisState;
+use profile_sercos::wire::idn::Idn;
+
+use super::drive_parameters;
+use super::truths::{Bench, GET, OK, SET, another, changed, held};
+
+/// The controller is gone, and another one connects that sets nothing.
+fn reconnect(rig: &mut Rig) {
+    rig.kill_controller();
+    rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
+    rig.connect(vec![Step::Dwell { seconds: 100_000.0 }]);
+    rig.run_until(millis(20_000), "Stopped or faulted", |rig| {
+        rig.status().connections == 1
+            && rig.engine.devices()[0].axis_states().all(|(_, state)| state == AxisState::Stopped)
+    });
+}
+
+/// Every attribute that a controller can change in a drive. On DeviceNet there is none.
+#[test]
+fn what_a_controller_has_changed_in_a_drive_ends_with_its_connection() {
+    let mapping = Mapping::embedded().expect("the shipped tables are sound");
+    for (bus, settings, least) in [
+        ("SERCOS", Settings::default(), 12),
+        ("CANopen", Settings::without_line(include_str!("can.toml")), 12),
+    ] {
+        let config = Config::parse(&settings.configuration, "rig.toml").expect("sound");
+        let stage = Stage::rehearse(&config, mapping.clone()).expect("it can be commissioned");
+        let axis =
+            stage.axes.iter().find(|axis| axis.device == 0 && axis.instance == 1).expect("the first axis");
+        let truths = stage.mapping.truths(&axis.attributes, &axis.south);
+        let mut bench = Bench::start(bus, settings);
+        let first = held(&bench.rig);
+        let mut places = BTreeSet::new();
+        let mut values = Vec::new();
+        for row in truths.iter().filter(|row| row.truth != Truth::Absent && row.access == Access::Set) {
+            let known = mapping.dictionaries.cip.attribute_by_id(row.id).expect("of the dictionary");
+            let (_, value) = bench.ask(GET, row.id, &[]);
+            let Some(other) = another(known, &value) else { continue };
+            let (status, changed) = bench.set(row.id, &other);
+            if status == OK && !changed.is_empty() {
+                places.extend(changed);
+                values.push((row.id, value));
+            }
+        }
+        assert!(values.len() >= least, "{bus}: {} attributes, {places:?}", values.len());
+        let mut left = changed(&first, &held(&bench.rig));
+        left.retain(|place| places.contains(place));
+        assert_eq!(left, places, "{bus}: the drive has what the controller has set");
+
+        reconnect(&mut bench.rig);
+        let mut left = changed(&first, &held(&bench.rig));
+        left.retain(|place| places.contains(place));
+        assert_eq!(left, BTreeSet::new(), "{bus}: the drive has what it had");
+        for (id, value) in values {
+            assert_eq!(bench.ask(GET, id, &[]), (OK, value), "{bus}: attribute {id}");
+        }
+    }
+}
+
+/// What a person has set at the drive meanwhile is the person's.
+#[test]
+fn what_somebody_else_has_set_meanwhile_stays() {
+    let kpp = Idn::standard(104);
+    let mut bench = drive_parameters::Bench::sercos(|_| {});
+    let by_itself = drive_parameters::held(&bench, kpp);
+    let connect = |rig: &mut Rig| {
+        rig.connect(vec![Step::Dwell { seconds: 100_000.0 }]);
+        rig.run_until(millis(20_000), "Stopped", |rig| {
+            rig.engine.devices()[0].axis_states().all(|(_, state)| state == AxisState::Stopped)
+        });
+    };
+    let set = |rig: &mut Rig, value: f32| {
+        let client = axisbridge_tests::rig::explicit::Client::connect(rig, axisbridge_tests::rig::CONTROLLER);
+        assert_eq!(client.ask(rig, SET, 1, Some(441), &value.to_le_bytes()).0, OK);
+    };
+    connect(&mut bench.rig);
+    set(&mut bench.rig, 50.0);
+    assert_eq!(drive_parameters::held(&bench, kpp), 300);
+    bench.rig.kill_controller();
+    bench.rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
+    assert_eq!(drive_parameters::held(&bench, kpp), 300, "nothing is done behind a connection");
+    let reply = bench.say("write turntable S-0-0104 7.00");
+    assert!(reply.starts_with("ok "), "{reply}");
+    reconnect(&mut bench.rig);
+    assert_eq!(drive_parameters::held(&bench, kpp), 700);
+    // And is what the next connection gives back.
+    set(&mut bench.rig, 50.0);
+    reconnect(&mut bench.rig);
+    assert_eq!(drive_parameters::held(&bench, kpp), 700);
+    assert_ne!(by_itself, 700);
+}
