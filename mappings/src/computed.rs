@@ -204,13 +204,33 @@ impl Computation {
     /// Whether a drive with this program has what the value is computed from, in one of its operating modes at least.
     #[must_use]
     pub fn is_possible(&self, program: &DriveProgram) -> bool {
+        self.is_possible_with(program, &|read| read.is_in(program))
+    }
+
+    /// Whether that is so in every cycle: signals that the telegrams carry, and settings, for which this is true.
+    pub fn is_cyclic(&self, program: &DriveProgram, is_setting: impl Fn(Parameter) -> bool) -> bool {
+        self.is_possible_with(program, &|read| {
+            read.is_carried(program)
+                || (read.parameter.is_some_and(&is_setting) && read.is_in(program))
+                || matches!(read.of_drive(program), Fact::Value(_))
+        })
+    }
+
+    fn is_possible_with(&self, program: &DriveProgram, is_there: &dyn Fn(&Read) -> bool) -> bool {
         let modes = OperatingMode::ALL.iter().copied();
         let mut modes = modes.filter(|mode| *mode == OperatingMode::None || program.has_mode(*mode));
-        modes.any(|mode| self.row_is_possible(self.rows.len().saturating_sub(1), mode, program) == Some(true))
+        let last = self.rows.len().saturating_sub(1);
+        modes.any(|mode| self.row_is_possible(last, mode, program, is_there) == Some(true))
     }
 
     /// Whether a drive has what a row needs in a mode; `None` for what is 0 in this mode.
-    fn row_is_possible(&self, at: usize, mode: OperatingMode, program: &DriveProgram) -> Option<bool> {
+    fn row_is_possible(
+        &self,
+        at: usize,
+        mode: OperatingMode,
+        program: &DriveProgram,
+        is_there: &dyn Fn(&Read) -> bool,
+    ) -> Option<bool> {
         let Some(row) = self.rows.get(at) else { return Some(false) };
         // What the loops make in a mode follows from the profile of a drive; of one without parameters it is not known.
         if !row.modes.is_empty() && !program.has_parameters() {
@@ -221,10 +241,10 @@ impl Computation {
         }
         let has = |operand: &Operand| match *operand {
             Operand::Constant(_) => None,
-            Operand::Row(at) => self.row_is_possible(at, mode, program),
-            Operand::Read(at) => Some(self.reads.get(at).is_some_and(|read| read.is_in(program))),
-            Operand::ReadOrRow(read, at) => match self.row_is_possible(at, mode, program) {
-                Some(false) => Some(self.reads.get(read).is_some_and(|read| read.is_in(program))),
+            Operand::Row(at) => self.row_is_possible(at, mode, program, is_there),
+            Operand::Read(at) => Some(self.reads.get(at).is_some_and(is_there)),
+            Operand::ReadOrRow(read, at) => match self.row_is_possible(at, mode, program, is_there) {
+                Some(false) => Some(self.reads.get(read).is_some_and(is_there)),
                 other => other,
             },
         };
@@ -247,6 +267,25 @@ impl Computation {
             Operation::Product(factors) => all(factors),
             Operation::Ratio(dividend, divisor) => both(has(dividend), has(divisor)),
         }
+    }
+
+    /// What is known of its reads: the signals, and what the drive was asked for. `signal` gives the value that a signal has now,
+    /// `asked` what is known of the parameter in this place, which the drive has.
+    pub fn known(
+        &self,
+        program: &DriveProgram,
+        control: Control,
+        signal: impl Fn(Signal) -> Option<i64>,
+        mut asked: impl FnMut(usize, Parameter) -> Fact,
+    ) -> Known {
+        let mut known = Known { control, ..Known::default() };
+        for (place, (fact, read)) in known.facts.iter_mut().zip(&self.reads).enumerate() {
+            *fact = match read.fact(program, &signal) {
+                Fact::Unknown => read.parameter.map_or(Fact::Unknown, |parameter| asked(place, parameter)),
+                fact => fact,
+            };
+        }
+        known
     }
 
     /// What has to be written for the value to become `wanted`, and to which parameter.

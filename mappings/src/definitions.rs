@@ -32,6 +32,12 @@ pub(super) fn definitions(mapping: &Mapping, table: &AttributeTable) -> Vec<Attr
         };
         definition.backing = match entry.backing {
             Backing::Signal { .. } => attribute::Backing::Signal,
+            // Computed anew in each cycle where a list has it.
+            Backing::Parameter { parameter, .. }
+                if row.access == Access::Get && mapping.dictionaries.generic.is_cyclic(parameter) =>
+            {
+                attribute::Backing::Signal
+            }
             Backing::Parameter { .. } | Backing::Mechanics(_) => attribute::Backing::Drive,
             Backing::Constant(value) => {
                 definition.default = DefaultValue::Integer(value);

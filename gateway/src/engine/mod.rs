@@ -365,7 +365,7 @@ impl Engine {
         }
         for channel in devices {
             channel.exchange(&mut exchange);
-            channel.attributes(mapping, exchange.axes, buses, exchange.notice);
+            channel.attributes(now, mapping, exchange.axes, buses, exchange.notice);
         }
     }
 
@@ -464,7 +464,7 @@ fn hand_on(
     let data = answer.result.as_ref().map(|(data, _)| data.as_slice()).map_err(|failure| *failure);
     let axis = &mut axes[answer.axis];
     match answer.purpose {
-        Purpose::Attribute { .. } | Purpose::Original { .. } => {
+        Purpose::Attribute { .. } | Purpose::Original { .. } | Purpose::Setting(_) => {
             norths.devices.iter_mut().any(|channel| channel.answer(&answer, axes, notice));
         }
         Purpose::LocalParameter(ticket) => {

@@ -193,15 +193,11 @@ impl ParameterJob {
 
     /// What is known of the operands now: what the drive has answered, and the signals of this cycle.
     fn known(&self, computation: &Computation, program: &DriveProgram, axis: &AxisChannel) -> Known {
-        let mut known = Known { control: axis.control(), ..Known::default() };
-        let places = known.facts.iter_mut().zip(&self.answers).zip(&computation.reads);
-        for ((fact, answer), read) in places {
-            *fact = match (read.fact(program, |signal| axis.signal(signal)), answer) {
-                (Fact::Unknown, Some(value)) => Fact::Value(*value),
-                (fact, _) => fact,
-            };
-        }
-        known
+        let answer = |place: usize, _| match self.answers.get(place) {
+            Some(Some(value)) => Fact::Value(*value),
+            _ => Fact::Unknown,
+        };
+        computation.known(program, axis.control(), |signal| axis.signal(signal), answer)
     }
 
     fn read(

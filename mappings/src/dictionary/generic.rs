@@ -5,7 +5,7 @@ use profile_generic::image::Signal;
 use profile_generic::parameter::{Access, Parameter, ParameterType};
 use profile_generic::quantity::Quantity;
 
-use crate::computed::Computation;
+use crate::computed::{Computation, Operand, Read};
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::format::{GenericFile, Name, ParameterRow as GenericParameterRow};
@@ -150,6 +150,35 @@ impl GenericDictionary {
     /// The parameter with this number.
     pub fn by_number(&self, parameter: Parameter) -> Option<&GenericParameter> {
         self.parameters.iter().find(|known| known.parameter == parameter)
+    }
+
+    /// Whether a parameter is a setting or a rating, which changes only when somebody changes it, and no actual value: everything that
+    /// can be set, and the limits that drives fix.
+    #[must_use]
+    pub fn is_setting(&self, parameter: Parameter) -> bool {
+        let is_limit =
+            Parameter::VELOCITY_LIMIT_BIPOLAR == parameter || Parameter::TORQUE_LIMIT_BIPOLAR == parameter;
+        is_limit || self.by_number(parameter).is_some_and(|row| row.access != Access::Read)
+    }
+
+    /// Whether the value of a parameter can be computed in every cycle: from signals, and from what does not change by itself.
+    #[must_use]
+    pub fn is_cyclic(&self, parameter: Parameter) -> bool {
+        let is_known = |read: &Read| {
+            read.signal.is_some()
+                || read.parameter.is_some_and(|parameter| {
+                    // Known from the scaling of the drive.
+                    parameter == Parameter::MOTOR_TURNS_PER_UNIT || self.is_setting(parameter)
+                })
+        };
+        self.computation(parameter).is_some_and(|computation| {
+            let mut operands = computation.rows.iter().flat_map(|row| row.operation.operands());
+            // What a row computes is computed, also where the drive has it.
+            operands.all(|operand| match operand {
+                Operand::Read(at) => computation.reads.get(at).is_some_and(is_known),
+                Operand::ReadOrRow(..) | Operand::Row(_) | Operand::Constant(_) => true,
+            })
+        })
     }
 
     /// How the value of a parameter is computed, of the catalogue in drives that lack it; `None` for one that only drives have.

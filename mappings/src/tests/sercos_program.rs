@@ -40,8 +40,8 @@ fn telegrams_carry_the_values_of_every_mode_once() {
     let telegram = mapping.telegram(&rotary_axis(false), &DriveFacts::new()).unwrap();
     let idns = |list: &[Item]| list.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
     assert_eq!(idns(&telegram.command), "S-0-0134 S-0-0047 S-0-0037 S-0-0081 S-0-0036 S-0-0080");
-    assert_eq!(idns(&telegram.feedback), "S-0-0135 S-0-0051 S-0-0040 S-0-0084");
-    assert_eq!((telegram.command_bytes, telegram.feedback_bytes), (18, 12));
+    assert_eq!(idns(&telegram.feedback), "S-0-0135 S-0-0051 S-0-0040 S-0-0084 S-0-0189");
+    assert_eq!((telegram.command_bytes, telegram.feedback_bytes), (18, 16));
 }
 
 /// Each mode adds what lies inside of its own loop, and the telegram has what the drive takes.
@@ -73,7 +73,7 @@ fn what_the_drive_lacks_is_left_out_or_refused() {
     let mut facts = DriveFacts::new();
     facts.note_missing(Idn::standard(84));
     let telegram = mapping.telegram(&rotary_axis(false), &facts).unwrap();
-    assert_eq!((telegram.feedback.len(), telegram.feedback_bytes), (3, 10));
+    assert_eq!((telegram.feedback.len(), telegram.feedback_bytes), (4, 14));
     facts.note_missing(Idn::standard(47));
     let error = mapping.telegram(&rotary_axis(false), &facts).unwrap_err();
     assert_eq!(error.to_string(), "the drive has no S-0-0047, which carries position_command");
@@ -86,8 +86,8 @@ fn the_drives_own_length_counts_more_than_the_dictionarys() {
     let mut facts = obedient(mapping, &axis);
     facts.note_attribute(Idn::standard(84), Attribute(0x7122_0001));
     let program = mapping.sercos_program(&axis, &facts).unwrap();
-    assert_eq!(program.telegram.feedback_bytes, 14);
-    assert_eq!(program.feedback.required_len(), 14);
+    assert_eq!(program.telegram.feedback_bytes, 18);
+    assert_eq!(program.feedback.required_len(), 18);
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn telegrams_of_the_drive_become_feedback() {
     let mut feedback =
         AxisFeedback { status: StatusBits::IN_POSITION | StatusBits::FAULT, ..AxisFeedback::default() };
     // In operation, following, second mode; 1843199999 counts, then 1: one step over the end of 512 turns and on.
-    let mut telegram = [0x08, 0xC1, 0xFF, 0xFF, 0xDC, 0x6D, 0xFF, 0xFF, 0xFF, 0xFF, 0x7D, 0x00];
+    let mut telegram = [0x08, 0xC1, 0xFF, 0xFF, 0xDC, 0x6D, 0xFF, 0xFF, 0xFF, 0xFF, 0x7D, 0x00, 0, 0, 0, 0];
     assert_eq!(program.decode(&telegram, false, &mut feedback, &mut cached, &mut report), Some(0xC108));
     assert_eq!((feedback.report, feedback.mode), (Report::Operating, OperatingMode::Velocity));
     assert_eq!(
@@ -417,7 +417,7 @@ fn class_3_bits_become_status() {
     insta::assert_snapshot!(text);
     assert_eq!(
         mapping.telegram(&axis, &obedient(mapping, &axis)).unwrap().feedback.last(),
-        Some(&Idn::standard(84).into())
+        Some(&Idn::standard(189).into())
     );
 }
 

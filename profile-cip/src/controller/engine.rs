@@ -479,6 +479,13 @@ impl Controller {
     pub fn event_status(&self, axis: u8) -> Option<EventChecking> {
         self.axes.iter().find(|known| known.instance() == axis).map(|axis| axis.events.status())
     }
+
+    /// The value of an attribute in the cyclic read data of the newest update that had some, as its octets; `None` if there is no such
+    /// axis, or its list does not hold the attribute.
+    #[must_use]
+    pub fn cyclic_read(&self, axis: u8, attribute: u16) -> Option<&[u8]> {
+        self.axes.iter().find(|known| known.instance() == axis)?.lists.value(attribute)
+    }
 }
 
 /// Keeps an event for the caller while there is room.

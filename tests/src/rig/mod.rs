@@ -33,6 +33,7 @@ use axisbridge::config::Config;
 use axisbridge::engine::build::{Built, Commissioners, Host, build};
 use axisbridge::engine::bus::sercos::SercosBus;
 use axisbridge::engine::notice::Notice;
+use axisbridge::engine::phase_lock::LockState;
 use axisbridge::engine::port::SouthPort;
 use axisbridge::engine::{BUSES_MAX, Engine};
 use axisbridge::finding::Findings;
@@ -98,6 +99,12 @@ pub const HOST: Host = Host { mac: [0x02, 0x41, 0x42, 0, 0, 1], incarnation: 0x7
 
 /// Longest step of the virtual clock, so that streams are looked at when nothing else is due.
 const STEP_MAX: DurationNs = DurationNs::from_millis(1);
+
+/// A multiple of most cycles and update periods.
+pub const GRID: DurationNs = DurationNs::from_millis(8);
+
+/// The updates of a controller that connects so long behind an instant of the grid come on it: it has some steps to go before.
+const FIRST_TO_GRID: DurationNs = DurationNs::from_millis(3);
 
 /// The two tables that everybody needs are compiled once in a process.
 fn mapping() -> Mapping {
@@ -354,10 +361,23 @@ impl Rig {
     }
 
     /// Lets the buses come up.
-    pub fn until_ready(&mut self) {
+    pub fn until_up(&mut self) {
         self.run_until(DurationNs::from_secs(20), "the buses up", |rig| {
             rig.status().state == BoxState::READY
         });
+    }
+
+    /// Lets the buses come up, and their cycles come to the grid of system time. What a test begins with does
+    /// not depend on how long the start has taken: it ends a fixed time behind a multiple of [`GRID`].
+    pub fn until_ready(&mut self) {
+        self.until_up();
+        // The lock sees a bus in its next cycles.
+        self.run_for(GRID * 2);
+        self.run_until(DurationNs::from_secs(5), "the grid", |rig| {
+            rig.status().phase_lock.state != LockState::Pulling
+        });
+        let passed = self.now.since(START).as_nanos();
+        self.run_for(DurationNs(-passed.rem_euclid(GRID.as_nanos())) + GRID + FIRST_TO_GRID);
     }
 
     // ---- time -----------------------------------------------------------------------------------

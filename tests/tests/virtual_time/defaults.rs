@@ -8,7 +8,7 @@ use axisbridge::mapping::{Access, Mapping, Truth};
 use axisbridge::translate::Stage;
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{Rig, Settings};
-use profile_cip::controller::Step;
+use profile_cip::controller::{AxisSet, Step};
 use profile_cip::device::axis_state::AxisState;
 use profile_sercos::wire::idn::Idn;
 
@@ -19,11 +19,9 @@ use super::truths::{Bench, GET, OK, SET, another, changed, held};
 fn reconnect(rig: &mut Rig) {
     rig.kill_controller();
     rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
-    rig.connect(vec![Step::Dwell { seconds: 100_000.0 }]);
-    rig.run_until(millis(20_000), "Stopped or faulted", |rig| {
-        rig.status().connections == 1
-            && rig.engine.devices()[0].axis_states().all(|(_, state)| state == AxisState::Stopped)
-    });
+    rig.connect(vec![Step::Enable(AxisSet::first(1)), Step::Dwell { seconds: 100_000.0 }]);
+    // No torque before the drive is as it was.
+    rig.run_until(millis(20_000), "torque", |rig| rig.engine.axes()[0].may_have_torque());
 }
 
 /// Every attribute that a controller can change in a drive. On DeviceNet there is none.

@@ -9,6 +9,7 @@ mod can_device;
 mod can_faults;
 mod can_modes;
 mod computed_values;
+mod cyclic_reads;
 mod defaults;
 mod devicenet;
 mod drive_commands;

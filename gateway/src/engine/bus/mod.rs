@@ -48,6 +48,8 @@ pub enum Purpose {
         /// It goes back.
         write: bool,
     },
+    /// A setting of a drive that a cyclic list of a controller needs, with the index of the device of the axis.
+    Setting(u8),
     /// Local control's access to a parameter, by its ticket.
     LocalParameter(u32),
     /// A register's access to a parameter, by its ticket.

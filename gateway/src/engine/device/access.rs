@@ -6,7 +6,9 @@ use profile_cip::device::motion_device::MotionDevice;
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::parameter::Parameter;
 use profile_generic::state::Report;
+use profile_generic::time::MonotonicTime;
 
+use super::cyclic_values::CyclicValues;
 use super::originals::Originals;
 use super::refusal::{parameter_refusal, refusal};
 use super::scaling::signal_octets;
@@ -38,6 +40,8 @@ pub(super) struct Accesses {
     computed: ParameterJobs<Computed>,
     /// What the drive had before a controller changed it.
     originals: Originals,
+    /// What the computed values of cyclic lists need.
+    pub cyclic: CyclicValues,
 }
 
 /// An access to a computed value.
@@ -165,9 +169,17 @@ impl Accesses {
     }
 
     /// Asks the drive for what computed values need next, and answers the controller with those that are known.
-    pub fn advance(&mut self, on: &mut Accessed<'_>, buses: &mut Buses, mapping: &Mapping) {
+    pub fn advance(
+        &mut self,
+        now: MonotonicTime,
+        on: &mut Accessed<'_>,
+        buses: &mut Buses,
+        mapping: &Mapping,
+    ) {
         let Accessed { number, axis_number, attributes, axis, .. } = *on;
         self.give_back(on, buses);
+        let (place, purpose) = (on.axis_number, Purpose::Setting(on.number));
+        self.cyclic.advance(now, on.axis, |request| buses.access(place, request, purpose));
         let original = on.original(false);
         let device = &mut *on.device;
         let originals = &mut self.originals;
@@ -198,6 +210,7 @@ impl Accesses {
     /// A connection was opened: what the last one has changed in the drive goes back.
     pub fn opened(&mut self) {
         self.originals.give_back();
+        self.cyclic.start_over();
     }
 
     /// Whether the drive still takes back what it had.
@@ -273,6 +286,9 @@ impl Accesses {
         (ticket, attribute, write): (u32, u16, bool),
         notice: &mut dyn FnMut(Notice),
     ) {
+        if write && answer.result.is_ok() {
+            self.cyclic.written(answer.item, on.axis);
+        }
         if let Some(at) = self.writes.iter().position(|(of, ..)| *of == ticket) {
             let (_, id, value) = self.writes.remove(at);
             if answer.result.is_ok() {

@@ -12,6 +12,7 @@ use profile_generic::time_base::TimeBase;
 
 use super::access::{Accessed, Accesses};
 use super::axis::CipAxis;
+use super::cyclic_values;
 use super::reactions;
 use super::scaling::{Scaling, signal_octets};
 use super::stopping::{Settings, StopDefaults, Stopping};
@@ -47,6 +48,8 @@ pub(super) struct Member {
     node_fault: Option<SystemTime>,
     /// The action of the device in the last exchange.
     action: DriveAction,
+    /// The program of the drive by which the device knows what cannot be in cyclic lists.
+    listed_by: u64,
     /// What the reactions of the axis were made of; `None` while they are nobody's.
     reactions: Option<(Option<u64>, u32)>,
 }
@@ -71,6 +74,7 @@ impl Member {
             accesses: Accesses::default(),
             node_fault: None,
             action: DriveAction::None,
+            listed_by: 0,
             reactions: None,
         })
     }
@@ -137,6 +141,22 @@ impl Member {
             image.events = self.scaling.checkable(image.events);
             image.captured_at = system_stamp(time, axis.feedback().at);
         });
+        if axis.programs() != self.listed_by
+            && let Some(program) = axis.south()
+        {
+            self.listed_by = axis.programs();
+            let computed = &mut self.accesses.cyclic;
+            computed.commission();
+            let entries = self.scaling.attributes().entries().iter();
+            let never = entries.filter(|entry| {
+                let is_possible = cyclic_values::is_possible(mapping, program, entry);
+                if is_possible {
+                    computed.prepare(mapping, program, entry);
+                }
+                !is_possible
+            });
+            device.set_not_cyclic(place, never.map(|entry| entry.id));
+        }
         let (settings, sequence) = self.stopping.settings(Settings {
             rows: &mapping.cip.sequence,
             device,
@@ -184,7 +204,11 @@ impl Member {
         }
         if let Some(view) = device.position_view(place) {
             let (attributes, signals) = (self.scaling.attributes(), &*axis);
-            let mut octets = |id, octets: &mut [u8; 8]| signal_octets(attributes, signals, &view, id, octets);
+            let computed = &mut self.accesses.cyclic;
+            let mut octets = |id, octets: &mut [u8; 8]| {
+                signal_octets(attributes, signals, &view, id, octets)
+                    .or_else(|| computed.octets((around.mapping, attributes), signals, id, octets))
+            };
             device.publish_signals(place, &mut octets);
         }
         let Some(image) = device.command(place, now) else { return };
@@ -199,7 +223,9 @@ impl Member {
             return;
         }
         let mut inhibits = Inhibits::empty();
-        inhibits.set(Inhibits::CONFIGURATION_INCOMPLETE, !self.scaling.is_taken());
+        // Nor with what the last controller has left in the drive.
+        let is_incomplete = !self.scaling.is_taken() || self.accesses.is_returning();
+        inhibits.set(Inhibits::CONFIGURATION_INCOMPLETE, is_incomplete);
         inhibits.set(Inhibits::LIMIT_SWITCHES_NOT_TOLD, axis.misses_limit_switches());
         axis.set_inhibits(now, system, inhibits);
         let target = match &image.command {

@@ -2,6 +2,7 @@
 
 mod access;
 mod axis;
+mod cyclic_values;
 mod member;
 mod originals;
 mod reactions;
@@ -288,6 +289,7 @@ impl DeviceChannel {
     /// Carries accesses to attributes that live in the drive, or in its process image, to where they live.
     pub fn attributes(
         &mut self,
+        now: MonotonicTime,
         mapping: &Mapping,
         axes: &[AxisChannel],
         buses: &mut Buses,
@@ -308,7 +310,7 @@ impl DeviceChannel {
         }
         for (place, member) in self.members.iter_mut().enumerate() {
             let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-            accesses.advance(&mut on, buses, mapping);
+            accesses.advance(now, &mut on, buses, mapping);
         }
     }
 
@@ -321,7 +323,9 @@ impl DeviceChannel {
 
     /// Takes the drive's answer to an access for an attribute; `false` when it is another device's.
     pub fn answer(&mut self, answer: &Answer, axes: &[AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
-        let (Purpose::Attribute { device, .. } | Purpose::Original { device, .. }) = answer.purpose else {
+        let (Purpose::Attribute { device, .. } | Purpose::Original { device, .. } | Purpose::Setting(device)) =
+            answer.purpose
+        else {
             return false;
         };
         if device != self.number {
@@ -338,6 +342,10 @@ impl DeviceChannel {
                 accesses.answer(&mut on, answer, (ticket, attribute, write), notice);
             }
             Purpose::Original { write, .. } => member.accesses.original_answered(answer, write, notice),
+            Purpose::Setting(_) => {
+                let result = answer.result.as_ref().map(|(data, _)| data).map_err(|failure| *failure);
+                member.accesses.cyclic.take(result, &axes[answer.axis]);
+            }
             _ => {}
         }
         true

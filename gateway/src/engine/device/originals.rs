@@ -3,9 +3,9 @@
 //! list.
 //!
 //! The value is read before the first write, which waits behind the read in the queue of the drive. With the next connection all
-//! values go back, the last one that was changed first, as limits may depend on each other; the accesses of the controller wait
-//! for that, and it waits for an axis that still has torque. A drive that is lost is commissioned anew, and what it has then is
-//! what it has by itself.
+//! values go back, the last one that was changed first, as limits may depend on each other; the accesses of the controller and the
+//! torque of the axis wait for that, and it waits for an axis that still has torque of before. A drive that is lost is commissioned
+//! anew, and what it has then is what it has by itself.
 
 use arrayvec::ArrayVec;
 
@@ -73,7 +73,8 @@ impl Originals {
 
     /// The drive is gone.
     pub fn forget_all(&mut self) {
-        *self = Self::default();
+        self.known.clear();
+        self.returning = false;
     }
 
     /// A connection was opened.

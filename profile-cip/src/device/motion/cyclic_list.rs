@@ -5,8 +5,8 @@
 //! that was never used gives way to the next one, so two are kept.
 //!
 //! The standard promises that what a list carries is read in every update and applied in the next one. Values stored in
-//! the device keep that promise, and so do signals, which the owner of the device publishes in every cycle
-//! ([`CyclicLists::publish`]). A parameter of the drive, which only the service channel reaches, cannot; it is refused
+//! the device keep that promise, and so do signals and what is computed from them, which the owner of the device publishes in every
+//! cycle ([`CyclicLists::publish`]), as far as the drive has them ([`CyclicLists::set_refused`]). A parameter of the drive, which only the service channel reaches, cannot; it is refused
 //! with its own status ("attribute not gettable", "attribute not settable") instead of being served from a copy of
 //! unknown age. Neither can a string, whose length would move what stands behind it.
 //!
@@ -24,6 +24,9 @@ use crate::wire::status::GeneralStatus;
 pub const CYCLIC_ATTRIBUTES_MAX: usize = 16;
 /// Most octets of cyclic read data.
 pub(crate) const CYCLIC_DATA_MAX: usize = 256;
+
+/// Most attributes that a drive does not let be in a list.
+const REFUSED_MAX: usize = 128;
 
 /// Direction of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +51,8 @@ pub(crate) struct CyclicLists {
     next: Layout,
     /// The ID that was given last.
     given: u8,
+    /// What the drive of the axis does not let be in a list.
+    refused: ArrayVec<u16, REFUSED_MAX>,
 }
 
 /// Octets to skip so that the elements of an attribute are aligned to their size, at most to 32 bits.
@@ -56,6 +61,16 @@ fn align(at: usize, entry: &Entry) -> usize {
 }
 
 impl CyclicLists {
+    /// Without lists: a connection begins or ends. The drive stays.
+    pub fn start_over(&mut self) {
+        *self = Self { refused: core::mem::take(&mut self.refused), ..Self::default() };
+    }
+
+    /// Sets what the drive of the axis does not let be in a list.
+    pub fn set_refused(&mut self, ids: impl Iterator<Item = u16>) {
+        self.refused = ids.take(REFUSED_MAX).collect();
+    }
+
     /// The list with this ID, not 0, which is in use from now on.
     fn take_up(&mut self, id: u8) -> Option<&Layout> {
         if id == self.next.id {
@@ -104,8 +119,12 @@ impl CyclicLists {
         if list.len() > CYCLIC_ATTRIBUTES_MAX {
             return (GeneralStatus::RESOURCE_UNAVAILABLE, 0);
         }
+        let suits = |id| match Self::suits(table, id, direction) {
+            GeneralStatus::SUCCESS if self.refused.contains(&id) => GeneralStatus::ATTRIBUTE_NOT_GETTABLE,
+            status => status,
+        };
         let statuses: ArrayVec<IdStatus, CYCLIC_ATTRIBUTES_MAX> =
-            list.iter().map(|id| IdStatus { id, status: Self::suits(table, id, direction).0 }).collect();
+            list.iter().map(|id| IdStatus { id, status: suits(id).0 }).collect();
         let size: usize = list.iter().filter_map(|id| table.find(id)).map(|e| e.definition.size() + 3).sum();
         let fits = size <= CYCLIC_DATA_MAX;
         let good = fits && statuses.iter().all(|s| s.status == 0);
@@ -253,6 +272,24 @@ mod tests {
         let len = IdList::emit(&mut body, ids).expect("room");
         let (status, len) = lists.configure(&table(), direction, &body[..len], &mut response);
         (status, response[..len].to_vec())
+    }
+
+    #[test]
+    fn what_the_drive_does_not_have_in_its_telegrams_is_refused_on_every_connection() {
+        let mut lists = CyclicLists::default();
+        lists.set_refused([6].into_iter());
+        for _ in 0..2 {
+            let (mut body, mut response) = ([0; 64], [0; 64]);
+            let len = IdList::emit(&mut body, &[4, 6]).expect("room");
+            let (status, len) = lists.configure(&table(), Direction::Read, &body[..len], &mut response);
+            assert_eq!(status, GeneralStatus::ATTRIBUTE_LIST_ERROR);
+            let told = IdStatusList::parse(&response[..len]).expect("a list");
+            let told: Vec<_> = told.iter().map(|item| (item.id, item.status)).collect();
+            assert_eq!(told, [(4, 0), (6, GeneralStatus::ATTRIBUTE_NOT_GETTABLE.0)]);
+            lists.start_over();
+        }
+        lists.set_refused([].into_iter());
+        assert_eq!(configure(&mut lists, Direction::Read, &[4, 6]).0, GeneralStatus::SUCCESS);
     }
 
     #[test]

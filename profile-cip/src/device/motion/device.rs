@@ -371,6 +371,11 @@ impl MotionDevice {
         self.engine.instances.publish_signals(axis, value);
     }
 
+    /// Sets which attributes of an axis that are not in the device the drive does not let be in cyclic lists; up to 128.
+    pub fn set_not_cyclic(&mut self, axis: usize, ids: impl Iterator<Item = u16>) {
+        self.engine.instances.set_not_cyclic(axis, ids);
+    }
+
     /// How the controller sees the positions of an axis now.
     #[must_use]
     pub fn position_view(&self, axis: usize) -> Option<PositionView> {

@@ -177,6 +177,13 @@ impl Instances {
         slot.store.get(entry, entry.whole())
     }
 
+    /// Sets which attributes of an axis, which counts from 0, cannot be in cyclic lists.
+    pub fn set_not_cyclic(&mut self, axis: usize, ids: impl Iterator<Item = u16>) {
+        if let Some(slot) = self.slots.get_mut(axis) {
+            slot.read_lists.set_refused(ids);
+        }
+    }
+
     /// Publishes the signals of an axis, which counts from 0, that its cyclic read lists hold.
     pub fn publish_signals(
         &mut self,

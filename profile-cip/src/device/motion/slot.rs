@@ -35,8 +35,8 @@ impl Slot {
     pub fn start_over(&mut self, table: &AttributeTable) {
         self.store.reset(table);
         self.service.reset();
-        self.write_lists = CyclicLists::default();
-        self.read_lists = CyclicLists::default();
+        self.write_lists.start_over();
+        self.read_lists.start_over();
     }
 
     /// Whether its drive has or may have torque: until the drive reports otherwise.
