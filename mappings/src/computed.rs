@@ -505,7 +505,8 @@ impl Read {
             Some(parameter) if program.parameter(parameter).is_some_and(|held| held.from_drive.is_some()) => {
                 Fact::Unknown
             }
-            _ => Fact::Absent,
+            Some(parameter) => program.datum(parameter).map_or(Fact::Absent, Fact::Value),
+            None => Fact::Absent,
         }
     }
 

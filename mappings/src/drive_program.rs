@@ -313,6 +313,8 @@ pub struct DriveProgram {
     pub(super) commands: ArrayVec<(Action, Item), { Action::ALL.len() }>,
     pub(super) captures: CaptureProgram,
     pub(super) parameters: Vec<ParameterEntry>,
+    /// Values of parameters that the drive does not show, in the order of their numbers.
+    data: ArrayVec<(Parameter, i64), DATA_MAX>,
     /// What lies between its motor and its load, where that is known.
     pub mechanics: Option<Mechanics>,
     pub(super) position_step: Option<i64>,
@@ -320,6 +322,9 @@ pub struct DriveProgram {
     /// Set-point and target of the position stand in one place of the telegram.
     pub(super) shares_target: bool,
 }
+
+/// Most values of parameters that a drive does not show.
+pub const DATA_MAX: usize = 32;
 
 /// A fault or warning in a diagnostic word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -358,6 +363,7 @@ impl DriveProgram {
             commands: ArrayVec::new(),
             captures: CaptureProgram::default(),
             parameters: Vec::new(),
+            data: ArrayVec::new(),
             mechanics: None,
             position_step: None,
             acknowledges,
@@ -778,6 +784,18 @@ impl DriveProgram {
     pub fn parameter(&self, parameter: Parameter) -> Option<&ParameterEntry> {
         let at = self.parameters.binary_search_by_key(&parameter, |entry| entry.parameter).ok()?;
         self.parameters.get(at)
+    }
+
+    /// Sets the data that the configuration has of motor and power stage, up to [`DATA_MAX`]. What the drive shows itself counts more.
+    pub fn set_data(&mut self, data: &[(Parameter, i64)]) {
+        self.data =
+            data.iter().copied().filter(|(of, _)| self.parameter(*of).is_none()).take(DATA_MAX).collect();
+    }
+
+    /// What the configuration has of a parameter that the drive does not show.
+    #[must_use]
+    pub fn datum(&self, parameter: Parameter) -> Option<i64> {
+        self.data.iter().find(|(of, _)| *of == parameter).map(|(_, value)| *value)
     }
 
     /// The longest way from one position command to the next: in a drive that works modulo a longer one would lead the

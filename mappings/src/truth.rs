@@ -134,6 +134,9 @@ impl Mapping {
                 (Truth::Compared, format!("{} of the drive", held.item))
             }
             (Some(held), _) => (Truth::Live, held.item.to_string()),
+            (None, _) if drive.datum(parameter).is_some() => {
+                (Truth::Compared, "the configuration".to_owned())
+            }
             (None, Missing::Absent) => (Truth::Absent, format!("the drive has no {name}")),
             (None, Missing::Stored) => (Truth::Stored, format!("the drive has no {name}")),
             (None, Missing::Zero) if drive.has_parameters() => {

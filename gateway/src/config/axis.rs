@@ -1,5 +1,6 @@
 //! The axes, their limits, and where their drives are.
 
+use profile_generic::parameter::Parameter;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 
 use crate::mapping::CaptureMode;
@@ -62,11 +63,17 @@ pub struct Axis {
     pub power_structure_axis_id: u32,
     /// What the axis may do, beside what its drive allows.
     pub limits: Limits,
+    /// Data of motor and power stage.
+    pub nameplate: Nameplate,
     /// What happens when commands stay away.
     pub on_command_loss: StoppingAction,
     /// How the drive's captures of events are used.
     pub events: CaptureMode,
 }
+
+/// Data of motor and power stage that the drive does not show, in the units of the parameters and in the order of their numbers.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Nameplate(pub Vec<(Parameter, i64)>);
 
 /// Limits of an axis that the box holds; `None` leaves them to the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

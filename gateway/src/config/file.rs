@@ -261,6 +261,10 @@ pub struct AxisTable {
     /// `"ramped-decel-and-disable"`.
     #[schemars(transform = form::word(&check::axis::stopping_actions()))]
     pub on_command_loss: Option<Spanned<String>>,
+    /// Data of the motor that the drive does not show. Default: only what the drive shows.
+    pub motor: Option<MotorTable>,
+    /// Data of the power stage that the drive does not show. Default: only what the drive shows.
+    pub converter: Option<ConverterTable>,
     /// How the captures of the drive are read: `cyclic`, `service-channel` or `off`. Default: `cyclic` on SERCOS, `service-channel` (SDO)
     /// on CAN.
     #[schemars(transform = form::word(&check::axis::EVENTS))]
@@ -288,6 +292,63 @@ pub struct LimitsTable {
     /// Largest distance between actual and commanded position, in axis units.
     #[schemars(transform = form::positive)]
     pub following_error: Option<Spanned<f64>>,
+}
+
+/// `motor` of an `[[axis]]`: what its nameplate or data sheet says. What the drive shows counts more.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotorTable {
+    /// Rated torque in Nm, or rated force in N.
+    #[schemars(transform = form::positive)]
+    pub rated_torque: Option<Spanned<f64>>,
+    /// Rated continuous current in A.
+    #[schemars(transform = form::positive)]
+    pub rated_current: Option<Spanned<f64>>,
+    /// Peak current in A.
+    #[schemars(transform = form::positive)]
+    pub peak_current: Option<Spanned<f64>>,
+    /// Rated speed in revolutions per minute, or in m/s.
+    #[schemars(transform = form::positive)]
+    pub rated_speed: Option<Spanned<f64>>,
+    /// Highest speed in revolutions per minute, or in m/s.
+    #[schemars(transform = form::positive)]
+    pub max_speed: Option<Spanned<f64>>,
+    /// Rated voltage in V.
+    #[schemars(transform = form::positive)]
+    pub rated_voltage: Option<Spanned<f64>>,
+    /// Rated power in kW.
+    #[schemars(transform = form::positive)]
+    pub rated_power: Option<Spanned<f64>>,
+    /// Poles, twice the pairs of poles: 2 to 65534, even. Only of a rotary motor.
+    #[schemars(range(min = 2, max = 65_534), extend("multipleOf" = 2))]
+    pub poles: Option<Spanned<i64>>,
+    /// Inertia in kg m², or mass of the moving part in kg.
+    #[schemars(transform = form::positive)]
+    pub inertia: Option<Spanned<f64>>,
+    /// Resistance of the winding from phase to phase, in ohms.
+    #[schemars(transform = form::positive)]
+    pub resistance: Option<Spanned<f64>>,
+    /// Inductance of the winding from phase to phase, in henries.
+    #[schemars(transform = form::positive)]
+    pub inductance: Option<Spanned<f64>>,
+    /// Highest temperature of the winding in °C.
+    #[schemars(transform = form::positive)]
+    pub max_winding_temperature: Option<Spanned<f64>>,
+    /// Use of the thermal capacity of the motor at which the drive faults, in percent.
+    #[schemars(transform = form::positive)]
+    pub overload_limit: Option<Spanned<f64>>,
+}
+
+/// `converter` of an `[[axis]]`: what the nameplate of the power stage says. What the drive shows counts more.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ConverterTable {
+    /// Nominal voltage of the DC bus in V.
+    #[schemars(transform = form::positive)]
+    pub bus_voltage: Option<Spanned<f64>>,
+    /// Rated output current in A.
+    #[schemars(transform = form::positive)]
+    pub rated_current: Option<Spanned<f64>>,
 }
 
 impl LimitsTable {

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 
 use profile_generic::time::DurationNs;
 
-pub use self::axis::{Axis, AxisFunction, AxisKind, DriveAt, Limits, StoppingAction};
+pub use self::axis::{Axis, AxisFunction, AxisKind, DriveAt, Limits, Nameplate, StoppingAction};
 pub use self::can::{Can, CanDevice, CanDrive, CanLink, DeviceFile, Lss};
 pub(crate) use self::check::{DEFAULT_ALLOWED_LOSSES, DEFAULT_JITTER, DEFAULT_PRIORITY};
 pub use self::device::{Device, Identity};

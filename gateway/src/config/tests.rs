@@ -102,6 +102,7 @@ fn defaults_are_those_of_the_documentation() {
             unwind_counts: None,
             power_structure_axis_id: 0,
             limits: Limits::default(),
+            nameplate: Nameplate::default(),
             on_command_loss: StoppingAction::RampedDecelAndDisable,
             events: CaptureMode::Cyclic,
         }

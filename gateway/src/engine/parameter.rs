@@ -121,6 +121,9 @@ impl ParameterJob {
         let computation = mapping.dictionaries.generic.computation(self.parameter);
         let request = match computation.filter(|_| is_computed) {
             Some(computation) => self.compute(computation, axis),
+            None if let Some(value) = self.datum(axis) => {
+                Err(self.wanted.map_or(Ok(value), |_| Err(ParameterFailure::ReadOnly)))
+            }
             None => match self.wanted {
                 Some(wanted) => self.write(self.parameter, wanted, axis),
                 None => self.read(self.parameter, Asked::Value, axis),
@@ -134,6 +137,11 @@ impl ParameterJob {
                 Next::Done(result)
             }
         }
+    }
+
+    /// What the configuration has of it.
+    fn datum(&self, axis: &AxisChannel) -> Option<i64> {
+        axis.south()?.datum(self.parameter)
     }
 
     /// Why the value is not written, by what the tables say of the parameter.

@@ -31,6 +31,7 @@ mod loss;
 mod many;
 mod modes;
 mod motion_checker;
+mod nameplate;
 mod network;
 mod owner;
 mod phase_up;

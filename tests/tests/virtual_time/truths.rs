@@ -13,7 +13,7 @@ use axisbridge::simulate::devicenet_drive::DevicenetNode;
 use axisbridge::translate::Stage;
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::millis;
-use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
+use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::Step;
 use profile_cip::device::axis_state::AxisState;
 use profile_sercos::wire::idn::Idn;
@@ -32,6 +32,12 @@ const BUSES: [&str; 3] = ["SERCOS", "CiA 402", "DeviceNet"];
 
 /// Compared with the torque limits: refused if the drive would use more.
 const STOPPING_TORQUE: u16 = 611;
+
+/// Data of motor and power stage that the configuration has.
+const NAMEPLATE: &str = "motor = { rated_torque = 2.4, rated_current = 3.5, peak_current = 10.0, rated_speed = 3000.0, \
+                         max_speed = 6000.0, rated_voltage = 230.0, rated_power = 0.75, poles = 8, inertia = 0.00012, \
+                         resistance = 1.25, inductance = 0.008, max_winding_temperature = 130.0, overload_limit = 110.0 }\n\
+                         converter = { bus_voltage = 325.0, rated_current = 7.5 }\n";
 
 /// An attribute of a drive on DeviceNet, as the table of truths names it.
 fn attribute_place(id: u16) -> String {
@@ -258,11 +264,13 @@ impl Bench {
 #[test]
 fn attributes_are_what_the_table_of_truths_says() {
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
-    let settings = |text: &str| Settings::without_line(text);
+    let with_nameplate =
+        |text: &str| text.replacen("instance = 1\n", &format!("instance = 1\n{NAMEPLATE}"), 1);
+    let settings = |text: &str| Settings::without_line(&with_nameplate(text));
     let mut cells: BTreeMap<u16, Vec<String>> = BTreeMap::new();
     let mut counts = Vec::new();
     for (bus, settings) in BUSES.into_iter().zip([
-        Settings::default(),
+        Settings { configuration: with_nameplate(BOX), ..Settings::default() },
         settings(include_str!("can.toml")),
         settings(include_str!("devicenet.toml")),
     ]) {

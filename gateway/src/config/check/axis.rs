@@ -1,6 +1,6 @@
 //! An `[[axis]]`.
 
-use super::{Problems, limits, value};
+use super::{Problems, limits, nameplate, value};
 use crate::config::file::{AxisTable, LimitsTable};
 use crate::config::{Axis, AxisFunction, AxisKind, DriveAt, Limits, StoppingAction};
 use crate::finding::registry as code;
@@ -63,6 +63,7 @@ pub(super) fn check(
         Some(limits) => limits::check(problems, limits, table.unwind_counts.as_ref()),
         None => Some(Limits::default()),
     };
+    let nameplate = nameplate::check(problems, table, kind);
     // A PDO more is much of a CAN bus.
     let usual = match drive {
         Some(DriveAt::Can { .. }) => CaptureMode::ServiceChannel,
@@ -87,6 +88,7 @@ pub(super) fn check(
         unwind_counts: unwind_counts?,
         power_structure_axis_id: power_structure_axis_id?,
         limits: limits?,
+        nameplate: nameplate?,
         on_command_loss: on_command_loss?,
         events: events?,
     })

@@ -11,6 +11,7 @@ pub(super) mod devicenet;
 mod http;
 mod limits;
 pub(super) mod modbus;
+mod nameplate;
 mod problems;
 mod realtime;
 mod references;

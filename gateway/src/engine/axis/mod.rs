@@ -73,6 +73,7 @@ use profile_generic::hookup::TestReport;
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet, Signal};
 use profile_generic::interpolation::UpdateError;
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
+use profile_generic::parameter::Parameter;
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::sequence::SequenceStep;
 use profile_generic::state::{Action, BasicDrive, DriveState, Report};
@@ -182,6 +183,8 @@ pub struct AxisChannel {
     procedure: ProcedureUnit,
     /// Values of the drive mean something else than its program was made of.
     rescaled: bool,
+    /// What the configuration has of motor and power stage.
+    data: Vec<(Parameter, i64)>,
 }
 
 /// The generic state machine.
@@ -216,6 +219,7 @@ impl AxisChannel {
             captures: CaptureUnit::default(),
             procedure: ProcedureUnit::default(),
             rescaled: false,
+            data: Vec::new(),
         }
     }
 
@@ -433,6 +437,11 @@ impl AxisChannel {
         self.link.program()
     }
 
+    /// Sets the data that the configuration has of motor and power stage; to be called before the first cycle.
+    pub fn set_data(&mut self, data: Vec<(Parameter, i64)>) {
+        self.data = data;
+    }
+
     /// A number that is another one after the drive has got another program or is gone: what was made of [`Self::south`] may be kept
     /// as long as it is the same.
     #[must_use]
@@ -441,7 +450,8 @@ impl AxisChannel {
     }
 
     /// The drive is commissioned and will be spoken to by this program.
-    pub fn set_south(&mut self, program: DriveProgram) {
+    pub fn set_south(&mut self, mut program: DriveProgram) {
+        program.set_data(&self.data);
         self.procedure.restart(program.procedures());
         self.link.connect(program);
         self.captures.restart();

@@ -273,6 +273,7 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<(AxisChannel, CipProgram), 
     let moves = axis.function == AxisFunction::Drive;
     let mut channel = AxisChannel::new(limits, reaction(axis.on_command_loss), moves);
     channel.set_count(program.count());
+    channel.set_data(axis.nameplate.0.clone());
     Ok((channel, program))
 }
 

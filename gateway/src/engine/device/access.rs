@@ -92,6 +92,9 @@ impl Accesses {
             return self.compute(access, &entry, parameter);
         }
         let Some(held) = program.parameter(parameter) else {
+            if let Some(value) = program.datum(parameter) {
+                return on.compare_datum(access, &entry, value, notice);
+            }
             match missing {
                 Missing::Zero if program.has_parameters() => return on.compare_zero(access, &entry, notice),
                 Missing::Device if !program.can_go_by(parameter) => {
@@ -409,6 +412,29 @@ impl Accessed<'_> {
             }
         }
         self.keep(access)
+    }
+
+    /// What the configuration has of motor or power stage.
+    fn compare_datum(
+        &mut self,
+        access: &AttributeAccess,
+        entry: &AttributeEntry,
+        value: i64,
+        notice: &mut dyn FnMut(Notice),
+    ) -> Result<(), GeneralStatus> {
+        let mut bytes = [0; 8];
+        let len = shown(Some(entry), value, &mut bytes)?;
+        let held = bytes.get(..len).unwrap_or_default();
+        match &access.operation {
+            AccessOperation::Read(_) => self.device.complete_attribute(access.ticket, Ok(held)),
+            AccessOperation::Write(wanted) if entry.agree(wanted, held) => {
+                self.device.complete_attribute(access.ticket, Ok(&[]));
+            }
+            AccessOperation::Write(wanted) => {
+                return Err(self.not_equal(access.id, (entry.number(wanted), entry.number(held)), notice));
+            }
+        }
+        Ok(())
     }
 
     /// What the scaling of the drive comes to. What the controller has set is shown again as long as it is so.
