@@ -448,13 +448,20 @@ impl Read {
     /// Whether a drive with this program has it.
     fn is_in(&self, program: &DriveProgram) -> bool {
         self.is_carried(program)
+            || self.kept(program).is_some()
             || self.of_drive(program) != Fact::Absent
             || (self.is_zero_if_missing && program.has_parameters())
     }
 
-    /// Whether its signal is in the telegrams.
+    /// Its parameter, if the gateway keeps that itself.
+    fn kept(&self, program: &DriveProgram) -> Option<Parameter> {
+        self.parameter.filter(|parameter| program.keeps(*parameter))
+    }
+
+    /// Whether its signal is in the telegrams, or derived from what is there.
     fn is_carried(&self, program: &DriveProgram) -> bool {
-        self.signal.is_some_and(|signal| signal.is_command() || program.tells(signal))
+        self.signal
+            .is_some_and(|signal| signal.is_command() || program.tells(signal) || program.derives(signal))
     }
 
     /// What is known of its parameter without asking the drive.
@@ -471,7 +478,16 @@ impl Read {
     }
 
     /// What is known of it without asking the drive. `signal` gives the value that a signal has now.
-    pub fn fact(&self, program: &DriveProgram, signal: impl Fn(Signal) -> Option<i64>) -> Fact {
+    /// `kept` gives what the gateway keeps itself for a drive without it.
+    pub fn fact(
+        &self,
+        program: &DriveProgram,
+        signal: impl Fn(Signal) -> Option<i64>,
+        kept: impl Fn(Parameter) -> Option<i64>,
+    ) -> Fact {
+        if let Some(value) = self.kept(program).and_then(kept) {
+            return Fact::Value(value);
+        }
         if let Some(value) = self.signal.and_then(signal) {
             return Fact::Value(value);
         }

@@ -196,7 +196,10 @@ impl ParameterJob {
         let mut known = Known { control: axis.control(), ..Known::default() };
         let places = known.facts.iter_mut().zip(&self.answers).zip(&computation.reads);
         for ((fact, answer), read) in places {
-            *fact = match (read.fact(program, |signal| axis.signal(signal)), answer) {
+            *fact = match (
+                read.fact(program, |signal| axis.signal(signal), |parameter| axis.kept(parameter)),
+                answer,
+            ) {
                 (Fact::Unknown, Some(value)) => Fact::Value(*value),
                 (fact, _) => fact,
             };

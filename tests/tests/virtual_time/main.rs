@@ -13,6 +13,7 @@ mod devicenet;
 mod drive_commands;
 mod drive_parameters;
 mod drive_profile;
+mod encoders;
 mod ending;
 mod events;
 mod faults;

@@ -33,6 +33,9 @@ const BUSES: [&str; 3] = ["SERCOS", "CiA 402", "DeviceNet"];
 /// Compared with the torque limits: refused if the drive would use more.
 const STOPPING_TORQUE: u16 = 611;
 
+/// Cycle Resolution and Cycle Interpolation of both encoders.
+const COUNTS_OF_ENCODERS: [u16; 4] = [1416, 1417, 1466, 1467];
+
 /// An attribute of a drive on DeviceNet, as the table of truths names it.
 fn attribute_place(id: u16) -> String {
     format!("class 0x42 attribute {id}")
@@ -138,6 +141,10 @@ impl Bench {
             rig.engine.devices()[0].axis_states().next().is_some_and(|(_, state)| state == AxisState::Stopped)
         });
         let client = Client::connect(&mut rig, CONTROLLER);
+        // Encoders that nobody has described count nothing. An axis without the second one refuses.
+        for id in COUNTS_OF_ENCODERS {
+            client.ask(&mut rig, SET, 1, Some(id), &1_000_u32.to_le_bytes());
+        }
         let mut alive = BTreeSet::new();
         let mut before = held(&rig);
         for _ in 0..200 {

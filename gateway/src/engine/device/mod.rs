@@ -2,6 +2,7 @@
 
 mod access;
 mod axis;
+mod encoder;
 mod member;
 mod reactions;
 mod refusal;
@@ -310,7 +311,13 @@ impl DeviceChannel {
     }
 
     /// Takes the drive's answer to an attribute access; `false` when it is another device's.
-    pub fn answer(&mut self, answer: &Answer, axes: &[AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
+    pub fn answer(
+        &mut self,
+        answer: &Answer,
+        mapping: &Mapping,
+        axes: &[AxisChannel],
+        notice: &mut dyn FnMut(Notice),
+    ) -> bool {
         let Purpose::Attribute { ticket, device, attribute, write } = answer.purpose else { return false };
         if device != self.number {
             return false;
@@ -321,7 +328,7 @@ impl DeviceChannel {
             return false;
         };
         let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-        accesses.answer(&mut on, answer, (ticket, attribute, write), notice);
+        accesses.answer(&mut on, answer, (ticket, attribute, write), &mapping.cip, notice);
         true
     }
 
