@@ -6,10 +6,10 @@ use profile_cip::device::axis_object::PositionView;
 use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 use profile_generic::program::{Conversion, Width};
-use profile_generic::ratio::Ratio;
+use profile_generic::ratio::{Ratio, Rounding};
 
 use super::cip_scaling::CipScaling;
-use super::cip_tables::{CipTables, Missing, Served, ServedAttribute, limit_has_sign};
+use super::cip_tables::{CipTables, FeedbackUnit, Missing, Served, ServedAttribute, limit_has_sign};
 use super::dictionary::{Access, CipType, PolarityEffect};
 use super::mechanics::MechanicalFact;
 
@@ -68,6 +68,8 @@ pub enum Backing {
         missing: Missing,
         /// The attribute is one over the generic value; 0 on both sides is "none".
         reciprocal: bool,
+        /// What a value of an encoder counts in: the conversions leave that out.
+        feedback: Option<FeedbackUnit>,
     },
 }
 
@@ -197,6 +199,7 @@ fn entry(
                 from_generic: Conversion::new(to_generic.inverse()?),
                 missing,
                 reciprocal: unit.reciprocal,
+                feedback: unit.times.feedback(attribute.id),
             }
         }
     };
@@ -274,6 +277,10 @@ impl AttributeEntry {
         else {
             return Err(ValueError::NotConvertible);
         };
+        if self.feedback().is_some() {
+            // Its encoder says how much one is: [`AttributeEntry::from_encoder`].
+            return Err(ValueError::NotConvertible);
+        }
         let width = self.number_width()?;
         *out = [0; 8];
         if let Backing::Parameter { reciprocal: true, to_generic, .. } = &self.backing {
@@ -339,6 +346,52 @@ impl AttributeEntry {
         }
         *out = seen.to_le_bytes();
         Ok(width.bytes())
+    }
+
+    /// Writes the value of an encoder as the attribute into `out` and returns the bytes that count; `nanounits` are in one of
+    /// what it counts in. Counts roll over where the type of the attribute ends (clause 5-2.6.6.2).
+    ///
+    /// # Errors
+    /// As for [`AttributeEntry::from_generic`].
+    pub fn from_encoder(
+        &self,
+        generic: i64,
+        nanounits: Ratio,
+        out: &mut [u8; 8],
+    ) -> Result<usize, ValueError> {
+        let Backing::Parameter { from_generic, feedback: Some(FeedbackUnit { is_counts, .. }), .. } =
+            &self.backing
+        else {
+            return Err(ValueError::NotConvertible);
+        };
+        let width = self.number_width()?;
+        let ratio = nanounits.inverse().and_then(|each| from_generic.ratio.then(each));
+        let conversion = Conversion::new(ratio.ok_or(ValueError::Range)?);
+        *out = [0; 8];
+        match width {
+            Width::F32 => {
+                let (outcome, _) = conversion.convert_to_f32(generic);
+                out[..4].copy_from_slice(&outcome.value.to_le_bytes());
+            }
+            Width::F64 => return Err(ValueError::NotConvertible),
+            _ => {
+                let outcome = conversion.with_rounding(Rounding::Floor).convert(generic);
+                if outcome.saturated || !is_counts {
+                    return Err(ValueError::Range);
+                }
+                *out = outcome.value.to_le_bytes();
+            }
+        }
+        Ok(width.bytes())
+    }
+
+    /// What a value of an encoder counts in.
+    #[must_use]
+    pub fn feedback(&self) -> Option<FeedbackUnit> {
+        match self.backing {
+            Backing::Parameter { feedback, .. } => feedback,
+            _ => None,
+        }
     }
 
     /// Whether two values of the attribute are the same: reals to a thousandth, as drives keep whole steps of their units.

@@ -113,6 +113,8 @@ impl CipScaling {
             Times::One => Ratio::ONE,
             Times::MotionCount => Ratio::new(self.nanounits_per_unit, self.counts_per_unit)?,
             Times::MotionUnit => Ratio::new(self.nanounits_per_unit, 1)?,
+            // Whoever answers multiplies by what the attributes of the encoder say then.
+            Times::FeedbackCount | Times::FeedbackUnit => Ratio::ONE,
         };
         let sign = if turns && self.inverted { -1 } else { 1 };
         unit.ratio.then(times)?.then(Ratio::new(sign, 1)?)

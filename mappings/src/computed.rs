@@ -211,6 +211,7 @@ impl Computation {
     pub fn is_cyclic(&self, program: &DriveProgram, is_setting: impl Fn(Parameter) -> bool) -> bool {
         self.is_possible_with(program, &|read| {
             read.is_carried(program)
+                || read.kept(program).is_some()
                 || (read.parameter.is_some_and(&is_setting) && read.is_in(program))
                 || matches!(read.of_drive(program), Fact::Value(_))
         })
@@ -270,17 +271,18 @@ impl Computation {
     }
 
     /// What is known of its reads: the signals, and what the drive was asked for. `signal` gives the value that a signal has now,
-    /// `asked` what is known of the parameter in this place, which the drive has.
+    /// `kept` that of a parameter of the gateway, `asked` what is known of the parameter in this place, which the drive has.
     pub fn known(
         &self,
         program: &DriveProgram,
         control: Control,
         signal: impl Fn(Signal) -> Option<i64>,
+        kept: impl Fn(Parameter) -> Option<i64>,
         mut asked: impl FnMut(usize, Parameter) -> Fact,
     ) -> Known {
         let mut known = Known { control, ..Known::default() };
         for (place, (fact, read)) in known.facts.iter_mut().zip(&self.reads).enumerate() {
-            *fact = match read.fact(program, &signal) {
+            *fact = match read.fact(program, &signal, &kept) {
                 Fact::Unknown => read.parameter.map_or(Fact::Unknown, |parameter| asked(place, parameter)),
                 fact => fact,
             };
@@ -487,13 +489,20 @@ impl Read {
     /// Whether a drive with this program has it.
     fn is_in(&self, program: &DriveProgram) -> bool {
         self.is_carried(program)
+            || self.kept(program).is_some()
             || self.of_drive(program) != Fact::Absent
             || (self.is_zero_if_missing && program.has_parameters())
     }
 
-    /// Whether its signal is in the telegrams.
+    /// Its parameter, if the gateway keeps that itself.
+    fn kept(&self, program: &DriveProgram) -> Option<Parameter> {
+        self.parameter.filter(|parameter| program.keeps(*parameter))
+    }
+
+    /// Whether its signal is in the telegrams, or derived from what is there.
     fn is_carried(&self, program: &DriveProgram) -> bool {
-        self.signal.is_some_and(|signal| signal.is_command() || program.tells(signal))
+        self.signal
+            .is_some_and(|signal| signal.is_command() || program.tells(signal) || program.derives(signal))
     }
 
     /// What is known of its parameter without asking the drive.
@@ -511,7 +520,16 @@ impl Read {
     }
 
     /// What is known of it without asking the drive. `signal` gives the value that a signal has now.
-    pub fn fact(&self, program: &DriveProgram, signal: impl Fn(Signal) -> Option<i64>) -> Fact {
+    /// `kept` gives what the gateway keeps itself for a drive without it.
+    pub fn fact(
+        &self,
+        program: &DriveProgram,
+        signal: impl Fn(Signal) -> Option<i64>,
+        kept: impl Fn(Parameter) -> Option<i64>,
+    ) -> Fact {
+        if let Some(value) = self.kept(program).and_then(kept) {
+            return Fact::Value(value);
+        }
         if let Some(value) = self.signal.and_then(signal) {
             return Fact::Value(value);
         }

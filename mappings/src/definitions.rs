@@ -33,7 +33,7 @@ pub(super) fn definitions(mapping: &Mapping, table: &AttributeTable) -> Vec<Attr
         definition.backing = match entry.backing {
             Backing::Signal { .. } => attribute::Backing::Signal,
             // Computed anew in each cycle where a list has it.
-            Backing::Parameter { parameter, .. }
+            Backing::Parameter { parameter, feedback: None, .. }
                 if row.access == Access::Get && mapping.dictionaries.generic.is_cyclic(parameter) =>
             {
                 attribute::Backing::Signal

@@ -317,6 +317,8 @@ pub struct DriveProgram {
     data: ArrayVec<(Parameter, i64), DATA_MAX>,
     /// What lies between its motor and its load, where that is known.
     pub mechanics: Option<Mechanics>,
+    /// Its loops have a feed-forward of the acceleration of their own.
+    pub(super) feeds_forward: bool,
     pub(super) position_step: Option<i64>,
     pub(super) acknowledges: bool,
     /// Set-point and target of the position stand in one place of the telegram.
@@ -365,6 +367,7 @@ impl DriveProgram {
             parameters: Vec::new(),
             data: ArrayVec::new(),
             mechanics: None,
+            feeds_forward: false,
             position_step: None,
             acknowledges,
             shares_target: false,
@@ -383,8 +386,38 @@ impl DriveProgram {
                 let limits = [Parameter::TORQUE_LIMIT_POSITIVE, Parameter::TORQUE_LIMIT_NEGATIVE];
                 limits.iter().all(|limit| self.parameter(*limit).is_some())
             }
+            Parameter::SYSTEM_INERTIA => {
+                let torque = self.feedback.fields().any(|field| field.signal == Signal::TorqueActual);
+                let is_used = torque || self.can_go_by(Parameter::ACCELERATION_FEED_FORWARD_GAIN);
+                is_used && self.has_parameters() && self.motor_turns_per_unit().is_some()
+            }
+            Parameter::ACCELERATION_FEED_FORWARD_GAIN => {
+                let carries = self.command.fields().any(|field| field.signal == Signal::TorqueOffset);
+                let has_inertia = self.parameter(Parameter::SYSTEM_INERTIA).is_some();
+                carries && !self.feeds_forward && !has_inertia && self.motor_turns_per_unit().is_some()
+            }
+            Parameter::FEEDBACK_ACCELERATION_FILTER => self.derives(Signal::AccelerationActual),
+            Parameter::LOAD_FEEDBACK_UNIT
+            | Parameter::LOAD_FEEDBACK_RESOLUTION
+            | Parameter::LOAD_FEEDBACK_INTERPOLATION => {
+                self.parameter(Parameter::LOAD_POSITION_ACTUAL).is_some()
+            }
             _ => true,
         }
+    }
+
+    /// Whether the drive does by itself, in a unit of its own, what a parameter that it lacks is for.
+    #[must_use]
+    pub fn is_own(&self, parameter: Parameter) -> bool {
+        parameter == Parameter::ACCELERATION_FEED_FORWARD_GAIN && self.feeds_forward
+    }
+
+    /// Whether the gateway keeps a value itself that the drive lacks, for what is computed from it.
+    #[must_use]
+    pub fn keeps(&self, parameter: Parameter) -> bool {
+        matches!(parameter, Parameter::SYSTEM_INERTIA | Parameter::ACCELERATION_FEED_FORWARD_GAIN)
+            && self.parameter(parameter).is_none()
+            && self.can_go_by(parameter)
     }
 
     /// Whether the gateway knows the loops of the drive by its profile: it has parameters.
@@ -393,7 +426,7 @@ impl DriveProgram {
         !self.parameters.is_empty()
     }
 
-    /// Revolutions of the motor in one axis unit, in 1e-9: by gear and feed. `None` where nobody knows them.
+    /// Revolutions of the motor in one axis unit, in 1e-15: by gear and feed. `None` where nobody knows them.
     #[must_use]
     pub fn motor_turns_per_unit(&self) -> Option<i64> {
         self.mechanics.and_then(|mechanics| mechanics.motor_turns_per_unit())
@@ -440,6 +473,18 @@ impl DriveProgram {
     /// Whether the drive tells this value in every cycle.
     pub fn tells(&self, signal: Signal) -> bool {
         self.feedback.fields().any(|field| field.signal == signal)
+    }
+
+    /// Whether the gateway derives this value of every cycle from others that the drive tells.
+    #[must_use]
+    pub fn derives(&self, signal: Signal) -> bool {
+        let tells = |of: &[Signal]| of.iter().any(|signal| self.tells(*signal));
+        !self.tells(signal)
+            && match signal {
+                Signal::VelocityActual => tells(&[Signal::PositionActual]),
+                Signal::AccelerationActual => tells(&[Signal::PositionActual, Signal::VelocityActual]),
+                _ => false,
+            }
     }
 
     /// What leads the drive: the control word, and the operating mode where it has an octet of its own.

@@ -113,8 +113,8 @@ pub use cia402::{
 pub use cip_events::EventProgram;
 pub use cip_scaling::{CipScaling, CipScalingError};
 pub use cip_tables::{
-    CipTables, CipUnit, DisplacementUnit, ExceptionRow, Finder, Missing, ScalingAttributes,
-    SequenceAttributes, Served, ServedAttribute, Times,
+    CipTables, CipUnit, DisplacementUnit, ExceptionRow, FeedbackChannel, FeedbackUnit, Finder, Missing,
+    ScalingAttributes, SequenceAttributes, Served, ServedAttribute, Times,
 };
 pub use compile_cip::{
     CipConditions, CipFault, CipProgram, CipReport, CipRequest, CipState, CipStopping, CipTrackers, CipValue,

@@ -91,7 +91,8 @@ impl Mechanics {
         }
     }
 
-    /// Revolutions of the motor in one axis unit (a turn or a millimetre of the load), in 1e-9; `None` where nobody knows the travel.
+    /// Revolutions of the motor in one axis unit (a turn or a millimetre of the load), in 1e-15: over a million of them that is no count
+    /// of an encoder. `None` where nobody knows the travel.
     #[must_use]
     pub fn motor_turns_per_unit(&self) -> Option<i64> {
         let gear = self.gear.unwrap_or(Ratio::ONE);
@@ -99,7 +100,7 @@ impl Mechanics {
             UnitKind::Rotary => gear,
             UnitKind::Linear => gear.then(self.travel?.inverse()?)?,
         };
-        turns.apply(1_000_000_000, Rounding::Nearest).ok()
+        turns.apply(1_000_000_000_000_000, Rounding::Nearest).ok()
     }
 
     /// Whether the load turns as the motor does.
@@ -153,9 +154,9 @@ mod tests {
     #[test]
     fn a_unit_of_the_load_is_turns_of_the_motor_by_gear_and_travel() {
         let turns = |kind, gear, travel| Mechanics { kind, gear, travel }.motor_turns_per_unit();
-        assert_eq!(turns(UnitKind::Rotary, None, None), Some(1_000_000_000));
-        assert_eq!(turns(UnitKind::Rotary, Ratio::new(10, 3), None), Some(3_333_333_333));
-        assert_eq!(turns(UnitKind::Linear, Ratio::new(2, 1), Ratio::new(5, 1)), Some(400_000_000));
+        assert_eq!(turns(UnitKind::Rotary, None, None), Some(1_000_000_000_000_000));
+        assert_eq!(turns(UnitKind::Rotary, Ratio::new(10, 3), None), Some(3_333_333_333_333_333));
+        assert_eq!(turns(UnitKind::Linear, Ratio::new(2, 1), Ratio::new(5, 1)), Some(400_000_000_000_000));
         assert_eq!(turns(UnitKind::Linear, None, None), None);
     }
 

@@ -119,7 +119,9 @@ impl Mapping {
         let Some(table) = self.attribute_table(scaling) else { return numbers };
         for entry in table.entries() {
             // The step of a reciprocal differs from value to value.
-            let Backing::Parameter { parameter, to_generic, reciprocal: false, .. } = entry.backing else {
+            let Backing::Parameter { parameter, to_generic, reciprocal: false, feedback: None, .. } =
+                entry.backing
+            else {
                 continue;
             };
             let Some(row) = program.parameter(parameter) else { continue };

@@ -42,6 +42,9 @@ impl Mapping {
         if parameter == Parameter::MOTOR_TURNS_PER_UNIT {
             return "computes it from the scaling of the drive";
         }
+        if parameter == Parameter::OWN_ACCELERATION_FEED_FORWARD {
+            return "feeds no acceleration forward to a drive that does it itself";
+        }
         if self.dictionaries.generic.computation(parameter).is_some() {
             return "computes it where the drive has none";
         }
@@ -50,7 +53,7 @@ impl Mapping {
             _ => None,
         });
         match missing {
-            Some(Missing::Device) => "goes by it where the drive has none",
+            Some(Missing::Device | Missing::DeviceOrZero) => "goes by it where the drive has none",
             Some(Missing::Zero) => "takes 0 only where the drive has none",
             Some(Missing::Stored) => "stores it where the drive has none",
             Some(Missing::Absent) | None => "",

@@ -102,6 +102,9 @@ impl Mapping {
             Backing::Signal { signal, otherwise: Some(parameter), .. } if !drive.tells(signal) => {
                 self.truth_of(parameter, Missing::Absent, is_set, drive)
             }
+            Backing::Signal { signal, .. } if drive.derives(signal) => {
+                (Truth::Computed, format!("{signal}: from the values of earlier cycles"))
+            }
             Backing::Signal { signal, .. } => (Truth::Live, signal.to_string()),
             Backing::Parameter { parameter, missing, .. } => self.truth_of(parameter, missing, is_set, drive),
         }
@@ -139,10 +142,17 @@ impl Mapping {
             }
             (None, Missing::Absent) => (Truth::Absent, format!("the drive has no {name}")),
             (None, Missing::Stored) => (Truth::Stored, format!("the drive has no {name}")),
-            (None, Missing::Zero) if drive.has_parameters() => {
+            (None, Missing::DeviceOrZero) if drive.can_go_by(parameter) => {
+                (Truth::Live, "the gateway goes by it".to_owned())
+            }
+            (None, Missing::Zero | Missing::DeviceOrZero)
+                if drive.has_parameters() && !drive.is_own(parameter) =>
+            {
                 (Truth::Compared, format!("0: the drive has no {name}"))
             }
-            (None, Missing::Zero) => (Truth::Absent, format!("the drive has no {name}")),
+            (None, Missing::Zero | Missing::DeviceOrZero) => {
+                (Truth::Absent, format!("the drive has no {name}"))
+            }
             (None, Missing::Device) if !drive.can_go_by(parameter) => {
                 (Truth::Absent, "the drive does not show what it goes by".to_owned())
             }

@@ -437,7 +437,7 @@ impl Engine {
         let mut hand_on = |axes: &mut [AxisChannel], answer| {
             let notice = &mut |notice| push(&mut notices.borrow_mut(), notice);
             let norths = Norths { devices, local: local.as_mut(), registers: registers.as_mut() };
-            hand_on((now, system), norths, axes, answer, notice);
+            hand_on((now, system), mapping, norths, axes, answer, notice);
         };
         for bus in buses.iter_mut() {
             bus.set_idle(idle);
@@ -456,6 +456,7 @@ struct Norths<'a> {
 /// Hands the answer of a drive to whom has asked.
 fn hand_on(
     (now, system): (MonotonicTime, SystemTime),
+    mapping: &Mapping,
     norths: Norths<'_>,
     axes: &mut [AxisChannel],
     answer: Answer,
@@ -465,7 +466,7 @@ fn hand_on(
     let axis = &mut axes[answer.axis];
     match answer.purpose {
         Purpose::Attribute { .. } | Purpose::Original { .. } | Purpose::Setting(_) => {
-            norths.devices.iter_mut().any(|channel| channel.answer(&answer, axes, notice));
+            norths.devices.iter_mut().any(|channel| channel.answer(&answer, mapping, axes, notice));
         }
         Purpose::LocalParameter(ticket) => {
             note_set(norths.devices, answer.axis, &answer);

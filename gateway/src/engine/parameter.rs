@@ -205,7 +205,13 @@ impl ParameterJob {
             Some(Some(value)) => Fact::Value(*value),
             _ => Fact::Unknown,
         };
-        computation.known(program, axis.control(), |signal| axis.signal(signal), answer)
+        computation.known(
+            program,
+            axis.control(),
+            |signal| axis.signal(signal),
+            |parameter| axis.kept(parameter),
+            answer,
+        )
     }
 
     fn read(

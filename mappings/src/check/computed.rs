@@ -66,7 +66,8 @@ pub(super) fn bindings(mapping: &Mapping, findings: &mut Findings) {
     for (row, computation) in rows(mapping) {
         let is_drives = |read: &&Read| read.signal.is_none() && !read.is_zero_if_missing;
         let is_computed = |parameter: &Parameter| {
-            *parameter == Parameter::MOTOR_TURNS_PER_UNIT || generic.computation(*parameter).is_some()
+            let of_gateway = [Parameter::MOTOR_TURNS_PER_UNIT, Parameter::SYSTEM_INERTIA];
+            of_gateway.contains(parameter) || generic.computation(*parameter).is_some()
         };
         let reads = computation.reads.iter().filter(is_drives).filter_map(|read| read.parameter);
         for parameter in reads.filter(|parameter| !is_computed(parameter)) {

@@ -95,13 +95,10 @@ impl Builder<'_> {
             };
             let times = match &row.times {
                 None => Times::One,
-                Some(name) => {
-                    let words = [("motion_count", Times::MotionCount), ("motion_unit", Times::MotionUnit)];
-                    match self.resolver.word("times", name, &words) {
-                        Some(times) => times,
-                        None => continue,
-                    }
-                }
+                Some(name) => match self.resolver.word("times", name, &Times::NAMED) {
+                    Some(times) => times,
+                    None => continue,
+                },
             };
             self.tables.units.push((
                 row.unit.get_ref().clone(),

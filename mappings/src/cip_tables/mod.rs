@@ -29,6 +29,76 @@ pub enum Times {
     MotionCount,
     /// Nanounits in a displacement unit of the controller.
     MotionUnit,
+    /// Nanounits in a count of an encoder.
+    FeedbackCount,
+    /// Nanounits in the unit of an encoder.
+    FeedbackUnit,
+}
+
+/// An encoder of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FeedbackChannel {
+    /// At the motor.
+    One,
+    /// At the load.
+    Two,
+}
+
+impl FeedbackChannel {
+    /// The first attribute of channel 1, and how many a channel has (clause 5-2.3.5).
+    const FIRST: u16 = 1400;
+    const EACH: u16 = 50;
+
+    /// The channel of an attribute; `None` of one that describes no encoder, or one that an axis does not have here.
+    #[must_use]
+    pub const fn of(attribute: u16) -> Option<Self> {
+        match attribute.saturating_sub(Self::FIRST) / Self::EACH {
+            0 if attribute >= Self::FIRST => Some(Self::One),
+            1 => Some(Self::Two),
+            _ => None,
+        }
+    }
+
+    /// By how much the numbers of its attributes are above those of channel 1.
+    #[must_use]
+    pub const fn offset(self) -> u16 {
+        match self {
+            Self::One => 0,
+            Self::Two => Self::EACH,
+        }
+    }
+}
+
+/// What a value of an encoder counts in: the attributes of its channel say how much that is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FeedbackUnit {
+    /// Whose it is.
+    pub channel: FeedbackChannel,
+    /// Counts of the encoder; otherwise its units.
+    pub is_counts: bool,
+}
+
+impl Times {
+    /// All of them with their words in the tables.
+    pub(super) const NAMED: [(&'static str, Self); 4] = [
+        ("motion_count", Self::MotionCount),
+        ("motion_unit", Self::MotionUnit),
+        ("feedback_count", Self::FeedbackCount),
+        ("feedback_unit", Self::FeedbackUnit),
+    ];
+
+    /// What it counts in, of an attribute that is a value of an encoder.
+    pub(super) const fn feedback(self, attribute: u16) -> Option<FeedbackUnit> {
+        let is_counts = match self {
+            Self::FeedbackCount => true,
+            Self::FeedbackUnit => false,
+            Self::One | Self::MotionCount | Self::MotionUnit => return None,
+        };
+        match FeedbackChannel::of(attribute) {
+            Some(channel) => Some(FeedbackUnit { channel, is_counts }),
+            None => None,
+        }
+    }
 }
 
 /// How a CIP unit becomes a generic one.
@@ -186,6 +256,8 @@ pub enum Missing {
     Absent,
     /// The device goes by its value itself.
     Device,
+    /// The device goes by its value itself where it can; elsewhere as [`Missing::Zero`].
+    DeviceOrZero,
     /// The loops of the drive have no such term: it is 0, and can be set to nothing else.
     Zero,
     /// Stored and given back, without effect.
@@ -193,9 +265,10 @@ pub enum Missing {
 }
 
 /// Words of `missing`; without one the attribute is not supported.
-pub(crate) const MISSING: [(&str, Missing); 4] = [
+pub(crate) const MISSING: [(&str, Missing); 5] = [
     ("reject", Missing::Absent),
     ("device", Missing::Device),
+    ("device_or_zero", Missing::DeviceOrZero),
     ("zero", Missing::Zero),
     ("stored", Missing::Stored),
 ];

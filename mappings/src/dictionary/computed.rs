@@ -19,8 +19,8 @@ const OPERANDS_MAX: usize = 32;
 /// The most factors of a product: that many of 31 bits fit the arithmetic.
 const FACTORS_MAX: usize = 4;
 
-/// Revolutions of the motor in a unit of the axis, in 1e-9: up to a gear of 1000:1.
-const MOTOR_TURNS: (i64, i64) = (1, 1_000_000_000_000);
+/// Revolutions of the motor in a unit of the axis, in 1e-15: up to a gear of 1000:1.
+const MOTOR_TURNS: (i64, i64) = (1, 1_000_000_000_000_000_000);
 
 /// Whether a value beyond an end of `limit` is held at it.
 pub(crate) const AT_LIMIT: [(&str, bool); 2] = [("hold", true), ("none", false)];

@@ -446,6 +446,7 @@ impl DriveProgram {
         compiler.add_faults(&mut program)?;
         program.add_parameters(&tables.parameters, |rule| compiler.parameter(rule))?;
         program.mechanics = Some(compiler.mechanics());
+        program.feeds_forward = compiler.feeds_forward();
         program.captures = captures::compile(&compiler, &program.telegram);
         Ok(program)
     }
@@ -649,6 +650,14 @@ impl Compiler<'_> {
         let feed = rules.filter_map(|rule| rule.feed).next();
         let travel = feed.and_then(|idn| feed_constant(self.tables, self.dictionary, self.facts, idn).ok());
         Mechanics { kind, gear, travel: travel.filter(|_| kind == UnitKind::Linear) }
+    }
+
+    /// Whether the loops of the drive feed the acceleration forward by themselves.
+    fn feeds_forward(&self) -> bool {
+        let mut rules = self.tables.parameters.iter();
+        rules.any(|rule| {
+            rule.parameter == Parameter::OWN_ACCELERATION_FEED_FORWARD && !self.facts.is_missing(rule.at.idn)
+        })
     }
 
     /// Whether the drive works in another operation mode than this one, in a mode of the axis that has both.

@@ -551,7 +551,7 @@ fn shipped_rows_of_the_loops_come_out() {
         ("torque_actual", 250_000),
         ("motor_rated_torque", 2_000_000),
         ("velocity_actual", 2_500_000_000),
-        ("motor_turns_per_unit", 4_000_000_000),
+        ("motor_turns_per_unit", 4_000_000_000_000_000),
     ];
     assert_eq!(value("output_power", &power), Ok(31_416));
     // A quarter of 3 A, backwards.

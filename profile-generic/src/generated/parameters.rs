@@ -61,13 +61,27 @@ parameter_rows! {
         "Part of the velocity set-point that is fed forward.";
     ACCELERATION_FEED_FORWARD_GAIN = 0x0506, "acceleration_feed_forward_gain", BasicDrive, Fraction, Integer, Write,
         "Part of the acceleration set-point that is fed forward.";
+    SYSTEM_INERTIA = 0x0507, "system_inertia", BasicDrive, None, Integer, Write,
+        "Torque that accelerates motor and load by one motor revolution per second squared, in 1e-9 percent of the rated torque.";
+    OWN_ACCELERATION_FEED_FORWARD = 0x0508, "own_acceleration_feed_forward", BasicDrive, Current, Integer, Read,
+        "Current that the loops of the drive feed forward for each radian per second squared.";
 
     GEAR_RATIO_NUMERATOR = 0x0605, "gear_ratio_numerator", BasicDrive, None, Integer, WriteWhileDisabled,
         "Motor revolutions in the stated number of load revolutions.";
     GEAR_RATIO_DENOMINATOR = 0x0606, "gear_ratio_denominator", BasicDrive, None, Integer, WriteWhileDisabled,
         "Load revolutions for the stated number of motor revolutions.";
     MOTOR_TURNS_PER_UNIT = 0x0609, "motor_turns_per_unit", BasicDrive, None, Integer, Read,
-        "Revolutions of the motor in one axis unit, in 1e-9; the gateway computes it from gear and feed.";
+        "Revolutions of the motor in one axis unit, in 1e-15; the gateway computes it from gear and feed.";
+    FEEDBACK_VELOCITY_FILTER = 0x060A, "feedback_velocity_filter", BasicDrive, Time, Integer, Write,
+        "Time constant of the low-pass filter of the actual velocity, 0 for none.";
+    FEEDBACK_ACCELERATION_FILTER = 0x060B, "feedback_acceleration_filter", BasicDrive, Time, Integer, Write,
+        "Time constant of the low-pass filter of the actual acceleration, 0 for none.";
+    LOAD_FEEDBACK_UNIT = 0x060C, "load_feedback_unit", BasicDrive, None, Integer, Write,
+        "Unit of the encoder at the load, as the profile of the controller numbers it.";
+    LOAD_FEEDBACK_RESOLUTION = 0x060D, "load_feedback_resolution", BasicDrive, None, Integer, Write,
+        "Cycles in a unit of the encoder at the load.";
+    LOAD_FEEDBACK_INTERPOLATION = 0x060E, "load_feedback_interpolation", BasicDrive, None, Integer, Write,
+        "Counts in a cycle of the encoder at the load.";
 
     MOTOR_NAME = 0x0702, "motor_name", BasicDrive, None, Text, Read,
         "Type designation of the motor.";
@@ -104,6 +118,8 @@ parameter_rows! {
 
     LOAD_POSITION_ACTUAL = 0x0906, "load_position_actual", BasicDrive, Position, Integer, Read,
         "Actual position of the load feedback.";
+    LOAD_VELOCITY_ACTUAL = 0x0907, "load_velocity_actual", BasicDrive, Velocity, Integer, Read,
+        "Actual velocity of the load feedback.";
     TORQUE_ACTUAL = 0x0909, "torque_actual", BasicDrive, Torque, Integer, Read,
         "Actual torque or force.";
     CURRENT_ACTUAL = 0x090A, "current_actual", BasicDrive, Current, Integer, Read,
@@ -154,6 +170,22 @@ parameter_rows! {
         "Revolutions of the motor per second.";
     MOTOR_ANGULAR_VELOCITY = 0x0932, "motor_angular_velocity", BasicDrive, Gain, Integer, Read,
         "Angular velocity of the motor in radians per second.";
+    MOTOR_POSITION = 0x0933, "motor_position", BasicDrive, Position, Integer, Read,
+        "Revolutions of the motor.";
+    MOTOR_ACCELERATION = 0x0934, "motor_acceleration", BasicDrive, Acceleration, Integer, Read,
+        "Revolutions of the motor per second squared.";
+    LOOP_TORQUE = 0x0935, "loop_torque", BasicDrive, Torque, Integer, Read,
+        "Torque that the position and velocity loops make, downstream of the limits.";
+    LOOP_TORQUE_PARTS = 0x0936, "loop_torque_parts", BasicDrive, None, Integer, Read,
+        "The same as a number of millionths of the rated torque.";
+    LOOP_MOTOR_ACCELERATION = 0x0937, "loop_motor_acceleration", BasicDrive, None, Integer, Read,
+        "Acceleration of the motor that this torque makes, in 1e-9 revolutions per second squared.";
+    LOOP_AXIS_ACCELERATION = 0x0938, "loop_axis_acceleration", BasicDrive, None, Integer, Read,
+        "The same of the axis, in 1e-9 units per second squared.";
+    LOOP_ACCELERATION = 0x0939, "loop_acceleration", BasicDrive, Acceleration, Integer, Read,
+        "Acceleration that the torque of the loops makes.";
+    VELOCITY_LOOP_OUTPUT = 0x093A, "velocity_loop_output", BasicDrive, Acceleration, Integer, Read,
+        "Output of the velocity loop without what is fed forward.";
 
     BUS_VOLTAGE = 0x0A01, "bus_voltage", BasicDrive, Voltage, Integer, Read,
         "Voltage of the DC bus.";

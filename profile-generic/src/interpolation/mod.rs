@@ -417,6 +417,13 @@ impl FineInterpolator {
         }
     }
 
+    /// The acceleration of the fine set-points at `now`: the commanded one, or how the velocity or the position changes. None where no
+    /// update leads on.
+    pub fn acceleration(&self, now: MonotonicTime) -> Acceleration {
+        let segment = self.segments.first().filter(|segment| now.since(segment.start) <= segment.follow);
+        segment.map_or(Acceleration::ZERO, |segment| segment.acceleration_at(now))
+    }
+
     /// Whether updates were lost, so that a new start is needed.
     pub const fn is_lost(&self) -> bool {
         self.lost
@@ -483,6 +490,17 @@ impl Segment {
             _ => points.acceleration,
         };
         Motion { position: points.position, velocity: points.velocity, acceleration, torque: points.torque }
+    }
+
+    fn acceleration_at(&self, now: MonotonicTime) -> Acceleration {
+        let place = self.place(now);
+        Acceleration(match (self.acceleration, self.velocity, self.position) {
+            (Some(curve), ..) => curve.value(&place),
+            // A velocity has finer steps than the counts of a position.
+            (None, Some(curve), _) => curve.slope_per_second(&place),
+            (None, None, Some(curve)) => curve.bend_per_second(&place),
+            (None, None, None) => 0,
+        })
     }
 
     /// How far along its curve the segment is at `at`. A curve is followed to its end and through the overrun that the

@@ -27,6 +27,9 @@ const LONG: u8 = 0x15;
 /// Kept where the drive never uses more, and refused otherwise.
 const STOPPING_TORQUE: u16 = 611;
 
+/// Positions of encoders, in their counts.
+const ENCODERS: [u16; 2] = [1402, 1452];
+
 fn octets(data_type: CipType) -> usize {
     data_type.width().map_or(1, |width| width.bytes())
 }
@@ -101,6 +104,10 @@ fn every_attribute_answers_as_its_row_in_the_dictionary_says() {
             continue;
         };
         match served {
+            // Nobody has said what a count of the encoder is.
+            Served::Parameter { .. } if ENCODERS.contains(&id) => {
+                check("get", status, &[DEVICE_CONFLICT, NOT_SUPPORTED]);
+            }
             // The drive may lack the parameter, and a signal may have no value now.
             Served::Parameter { .. } => check("get", status, &[OK, NOT_SUPPORTED]),
             Served::Signal { .. } => check("get", status, &[OK, DEVICE_CONFLICT]),

@@ -23,6 +23,7 @@ const SLIDE: u8 = 2;
 
 /// Numbers of the attributes of this file.
 mod id {
+    pub const MOTION_POLARITY: u16 = 79;
     pub const VELOCITY_FEED_FORWARD: u16 = 433;
     pub const POSITION_ERROR: u16 = 436;
     pub const POSITION_INTEGRATOR: u16 = 437;
@@ -34,6 +35,9 @@ mod id {
     pub const VELOCITY_REFERENCE: u16 = 453;
     pub const VELOCITY_ERROR: u16 = 455;
     pub const VELOCITY_INTEGRATOR: u16 = 456;
+    pub const VELOCITY_LOOP: u16 = 457;
+    pub const KAFF: u16 = 460;
+    pub const KJ: u16 = 496;
     pub const TORQUE_REFERENCE: u16 = 492;
     pub const TORQUE_REFERENCE_FILTERED: u16 = 493;
     pub const TORQUE_REFERENCE_LIMITED: u16 = 494;
@@ -45,6 +49,7 @@ mod id {
     pub const BUS_VOLTAGE: u16 = 620;
     pub const MOTOR_TEMPERATURE: u16 = 642;
     pub const RATED_CURRENT_OF_INVERTER: u16 = 721;
+    pub const FEEDBACK_VELOCITY: u16 = 1403;
 }
 
 /// Everything that one of the loops makes.
@@ -169,6 +174,44 @@ fn position_loop_of_a_sercos_drive_that_moves_and_that_stands() {
         near("without torque", get(&mut rig, &client, TURNTABLE, id), 0.0, 0.0);
     }
     assert_eq!(get(&mut rig, &client, TURNTABLE, id::VELOCITY_INTEGRATOR), Err(NOT_SUPPORTED));
+}
+
+/// With an inverted Motion Polarity the drive turns the other way: what it has behind is negative there, and positive for the controller
+/// (Table 5-2.14), as the velocity of its encoder is.
+#[test]
+fn position_error_and_encoder_have_the_sign_of_the_controller() {
+    for (bus, configuration) in [("SERCOS", None), ("CANopen", Some(include_str!("can.toml")))] {
+        for polarity in [0, 1] {
+            let settings = configuration.map_or_else(Settings::default, Settings::without_line);
+            let mut attributes = vec![AttributeSet::usint(id::MOTION_POLARITY, polarity)];
+            // A drive that feeds all of the velocity forward has nothing behind.
+            attributes.extend(configuration.is_none().then(|| AttributeSet::real(id::KVFF, 0.0)));
+            let (mut rig, client) = rig(
+                settings,
+                vec![
+                    Step::SetAttributes { axis: TURNTABLE, attributes },
+                    Step::Enable(AxisSet::first(1)),
+                    turn(20.0, 2.0),
+                    Step::Dwell { seconds: 100.0 },
+                ],
+            );
+            rig.run_until(millis(20_000), "2 turns a second", |rig| {
+                rig.engine.axes()[0].feedback().velocity.get().abs() > 199 * NANO / 100
+            });
+            rig.run_for(millis(1_000));
+            let turns = if polarity == 0 { 1.0 } else { -1.0 };
+            let speed = if configuration.is_none() { idn(&rig, 40) } else { object(&mut rig, 0, 0x606C) };
+            assert!(speed * turns > 0.0, "{bus} {polarity}: {speed}");
+            // The CANopen drive has nothing behind at a constant speed.
+            if configuration.is_none() {
+                let held = idn(&rig, 189);
+                assert!(held * turns > 10_000.0, "{polarity}: {held}");
+                let error = get(&mut rig, &client, TURNTABLE, id::POSITION_ERROR);
+                near("position error", error, held * turns / 3.6, 100.0);
+            }
+            near(bus, get(&mut rig, &client, TURNTABLE, id::FEEDBACK_VELOCITY), 2.0, 0.05);
+        }
+    }
 }
 
 /// A trim of half a turn a second stands against the output of the position loop: together they are nothing.
@@ -381,6 +424,111 @@ fn torque_and_power_of_a_canopen_drive_that_moves() {
     for id in TORQUES.into_iter().chain([id::IQ_FEEDBACK, id::OUTPUT_CURRENT, id::OUTPUT_POWER]) {
         near("without torque", get(&mut rig, &client, SLIDE, id), 0.0, 0.0);
     }
+}
+
+/// The torque that the telegram adds for a drive: S-0-0081 in 0.1 %, or 60B2h in 0.1 %.
+fn added_torque(rig: &mut Rig) -> f64 {
+    if rig.can.is_empty() { idn(rig, 81) / 10.0 } else { object(rig, 0, 0x60B2) / 10.0 }
+}
+
+/// Half of what 2 turns a second squared take at 4 % for each: 4 % of the rated torque, with its sign.
+#[test]
+fn acceleration_is_fed_forward_as_a_torque_by_kaff_and_kj() {
+    // Offsets are in a telegram of CANopen where its configuration names them.
+    let drive = "name = \"drive-a\"\nnode = 1\n";
+    let canopen = include_str!("can.toml").replace(drive, &format!("{drive}offsets = [\"torque\"]\n"));
+    for (bus, configuration) in [("SERCOS", None), ("CANopen", Some(canopen.as_str()))] {
+        let velocity = |rig: &Rig| rig.engine.axes()[0].feedback().velocity.get();
+        let run = |kaff: f32, kj: f32| {
+            let settings = configuration.map_or_else(Settings::default, Settings::without_line);
+            let attributes = vec![AttributeSet::real(id::KAFF, kaff), AttributeSet::real(id::KJ, kj)];
+            let (mut rig, client) = rig(
+                settings,
+                vec![
+                    Step::SetAttributes { axis: TURNTABLE, attributes },
+                    Step::Enable(AxisSet::first(1)),
+                    Step::MoveAbsolute {
+                        axis: TURNTABLE,
+                        position: 6.0,
+                        limits: Limits { velocity: 3.0, acceleration: 2.0, jerk: 40.0 },
+                    },
+                    Step::Disable(AxisSet::first(1)),
+                    Step::Dwell { seconds: 100.0 },
+                ],
+            );
+            rig.run_until(millis(10_000), "half of its speed", |rig| velocity(rig) > NANO);
+            let up = added_torque(&mut rig);
+            let fed = get(&mut rig, &client, TURNTABLE, id::ACCELERATION_FEED_FORWARD);
+            rig.run_until(millis(10_000), "its speed", |rig| velocity(rig) > 29 * NANO / 10);
+            rig.run_until(millis(10_000), "it brakes", |rig| velocity(rig) < 2 * NANO);
+            let down = added_torque(&mut rig);
+            to_step(&mut rig, 4);
+            rig.run_for(millis(100));
+            near("at rest", Ok(added_torque(&mut rig)), 0.0, 0.0);
+            (up, down, fed)
+        };
+        let (up, down, fed) = run(50.0, 4.0);
+        near(bus, Ok(up), 4.0, 0.1);
+        near(bus, Ok(down), -4.0, 0.1);
+        near("452", fed, 1.0, 0.02);
+        let (up, down, fed) = run(0.0, 4.0);
+        assert_eq!((up, down), (0.0, 0.0), "{bus}: no part of it");
+        near("452 without Kaff", fed, 0.0, 0.0);
+        let (up, down, _) = run(100.0, 0.0);
+        assert_eq!((up, down), (0.0, 0.0), "{bus}: nothing to turn");
+    }
+}
+
+/// At a constant speed the loop makes the torque of the friction: at 2 % for a turn per second squared, half as much acceleration.
+#[test]
+fn velocity_loop_output_is_the_torque_over_kj() {
+    for (bus, configuration) in [("SERCOS", None), ("CANopen", Some(include_str!("can.toml")))] {
+        let settings = configuration.map_or_else(Settings::default, Settings::without_line);
+        let (mut rig, client) = rig(
+            settings,
+            vec![
+                Step::Enable(AxisSet::first(1)),
+                Step::Jog { axis: TURNTABLE, velocity: 4.0, acceleration: 40.0, jerk: 800.0, seconds: 9.0 },
+                Step::Dwell { seconds: 100.0 },
+            ],
+        );
+        rig.run_until(millis(10_000), "4 turns a second", |rig| {
+            rig.engine.axes()[0].feedback().velocity.get() > 39 * NANO / 10
+        });
+        rig.run_for(millis(1_000));
+        let answer = get(&mut rig, &client, TURNTABLE, id::VELOCITY_LOOP);
+        assert_eq!(answer, Err(DEVICE_CONFLICT), "{bus}: without an inertia");
+        let set =
+            |rig: &mut Rig, value: f32| client.ask(rig, SET, TURNTABLE, Some(id::KJ), &value.to_le_bytes()).0;
+        assert_eq!(set(&mut rig, -1.0), 0x09, "{bus}: no inertia");
+        for inertia in [2.0_f32, 0.5] {
+            assert_eq!(set(&mut rig, inertia), OK, "{bus}");
+            rig.run_for(millis(10));
+            let torque =
+                if configuration.is_none() { idn(&rig, 84) } else { object(&mut rig, 0, 0x6074) } / 10.0;
+            assert!(torque > 1.0, "{bus}: friction: {torque} %");
+            let expected = torque / f64::from(inertia);
+            near(bus, get(&mut rig, &client, TURNTABLE, id::VELOCITY_LOOP), expected, expected * 0.1 + 0.3);
+        }
+        assert_eq!(get(&mut rig, &client, TURNTABLE, id::VELOCITY_INTEGRATOR), Err(NOT_SUPPORTED));
+    }
+}
+
+/// A drive with a feed-forward of its own gets none besides: S-0-0348 is in the unit of its maker.
+#[test]
+fn drive_that_feeds_the_acceleration_forward_itself_takes_no_kaff() {
+    let mut rig = Rig::new(Settings::default());
+    let own = Definition::value(Idn::standard(348), 0x0111_0001, "Acceleration feed forward gain", 100);
+    rig.line.slaves_mut()[0].store_mut().define(own.unit("mAsec^2/rad"));
+    rig.until_ready();
+    rig.connect(vec![Step::Dwell { seconds: 100.0 }]);
+    let client = Client::connect(&mut rig, CONTROLLER);
+    rig.run_for(millis(1_000));
+    for (axis, expected) in [(TURNTABLE, NOT_SUPPORTED), (SLIDE, OK)] {
+        let (status, _) = client.ask(&mut rig, SET, axis, Some(id::KAFF), &50.0_f32.to_le_bytes());
+        assert_eq!(status, expected, "{axis}");
+    }
+    assert_eq!(get(&mut rig, &client, TURNTABLE, id::KAFF), Err(NOT_SUPPORTED));
 }
 
 /// Downstream of an acting limit nobody sees how much more the loops ask for.

@@ -15,6 +15,7 @@ mod devicenet;
 mod drive_commands;
 mod drive_parameters;
 mod drive_profile;
+mod encoders;
 mod ending;
 mod events;
 mod faults;

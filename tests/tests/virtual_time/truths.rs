@@ -39,6 +39,9 @@ const NAMEPLATE: &str = "motor = { rated_torque = 2.4, rated_current = 3.5, peak
                          resistance = 1.25, inductance = 0.008, max_winding_temperature = 130.0, overload_limit = 110.0 }\n\
                          converter = { bus_voltage = 325.0, rated_current = 7.5 }\n";
 
+/// Cycle Resolution and Cycle Interpolation of both encoders.
+const COUNTS_OF_ENCODERS: [u16; 4] = [1416, 1417, 1466, 1467];
+
 /// An attribute of a drive on DeviceNet, as the table of truths names it.
 fn attribute_place(id: u16) -> String {
     format!("class 0x42 attribute {id}")
@@ -144,6 +147,10 @@ impl Bench {
             rig.engine.devices()[0].axis_states().next().is_some_and(|(_, state)| state == AxisState::Stopped)
         });
         let client = Client::connect(&mut rig, CONTROLLER);
+        // Encoders that nobody has described count nothing. An axis without the second one refuses.
+        for id in COUNTS_OF_ENCODERS {
+            client.ask(&mut rig, SET, 1, Some(id), &1_000_u32.to_le_bytes());
+        }
         let mut alive = BTreeSet::new();
         let mut before = held(&rig);
         for _ in 0..200 {

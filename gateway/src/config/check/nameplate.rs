@@ -71,7 +71,7 @@ pub(super) fn check(problems: &mut Problems, table: &AxisTable, kind: Option<Axi
         None => {}
     }
     data.sort_by_key(|(parameter, _)| *parameter);
-    is_good.then(|| Nameplate(data))
+    is_good.then_some(Nameplate(data))
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use profile_generic::fault_set::Origin;
 use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet, Signal, StatusBits};
 use profile_generic::interpolation::Quality;
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
+use profile_generic::parameter::Parameter;
 use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::sequence::{Order, Sensed, SequenceStep, StopPlan};
 use profile_generic::state::{Action, DriveState, Event, Report, Request, Transition};
@@ -54,6 +55,7 @@ impl AxisChannel {
             return;
         }
         self.take_position(sampled, received.data, referenced);
+        self.take_acceleration(sampled);
         self.sense_halt(now);
         let moved = self.may_move();
         self.report(now, system, self.feedback.report);
@@ -92,6 +94,42 @@ impl AxisChannel {
             }
         }
         self.captures.sample(program.captures(), data, position, sampled);
+    }
+
+    /// The acceleration of a drive that reports none: from velocities of earlier cycles.
+    fn take_acceleration(&mut self, sampled: MonotonicTime) {
+        if !self.link.program().is_some_and(|program| program.derives(Signal::AccelerationActual)) {
+            return;
+        }
+        self.feedback.present.remove(FeedbackSet::ACCELERATION);
+        let filter = self.start_stop.settings.acceleration_filter;
+        let velocity = self.feedback.get(Signal::VelocityActual).map(Velocity);
+        let found = velocity.and_then(|velocity| self.supervision.acceleration(velocity, sampled, filter));
+        if let Some(acceleration) = found {
+            self.feedback.set(Signal::AccelerationActual, acceleration.get());
+        }
+    }
+
+    /// Adds the torque that is fed forward to the trim, for a drive that adds it both in the mode that it is told and in the one that it
+    /// shows; `lead` is whether set-points lead the axis.
+    fn feed_forward(&mut self, shown: ModeSelection, lead: bool) {
+        let told = self.command.selection();
+        let feed_forward = self.start_stop.settings.feed_forward;
+        let Some(program) = self.link.program().filter(|_| lead && feed_forward.gain != 0) else { return };
+        let closes_loop = matches!(told.mode, OperatingMode::Position | OperatingMode::Velocity);
+        let carried = program.carries(told) & program.carries(shown);
+        if !closes_loop
+            || !carried.contains(CommandSet::TORQUE_OFFSET)
+            || !program.keeps(Parameter::ACCELERATION_FEED_FORWARD_GAIN)
+        {
+            return;
+        }
+        let Some(turns) = program.motor_turns_per_unit() else { return };
+        // It is what the set-points come to, also of a controller that commands positions alone.
+        let acceleration = self.set_points.acceleration();
+        self.command.set(Signal::AccelerationCommand, acceleration.get());
+        let torque = self.command.torque_offset.saturating_add(feed_forward.torque(acceleration, turns));
+        self.command.set(Signal::TorqueOffset, torque.get());
     }
 
     /// A drive that knows no halt has halted when it stands: nothing in its status word would say so.
@@ -629,6 +667,7 @@ impl AxisChannel {
         let lead = fine.is_some_and(|quality| quality != Quality::Lost);
         let shown = self.feedback.selection();
         self.set_points.trims.write(&mut self.command, shown, self.link.program(), lead);
+        self.feed_forward(shown, lead);
         match fine {
             Some(_) if lead => Lead::SetPoints,
             _ if rests.is_some() => Lead::Nobody,

@@ -30,6 +30,7 @@ mod cycle;
 mod diagnosis;
 mod diagnostic_message;
 mod faults;
+mod feed_forward;
 mod guard;
 mod handshake;
 mod history;
@@ -54,6 +55,7 @@ mod velocimeter;
 mod waiting;
 
 pub use self::diagnostic_message::DiagnosticMessage;
+pub use self::feed_forward::FeedForward;
 pub use self::guard::Trip;
 pub use self::hookup::HookupSettings;
 pub use self::orders::{Intent, Owner, Wish};
@@ -293,6 +295,17 @@ impl AxisChannel {
             None if signal.is_command() => self.command.get(signal),
             None => self.feedback.get(signal),
             trim => trim,
+        }
+    }
+
+    /// What the gateway keeps of the parameters that it goes by for a drive without them; `None` for others.
+    #[must_use]
+    pub fn kept(&self, parameter: Parameter) -> Option<i64> {
+        let FeedForward { gain, inertia } = self.start_stop.settings.feed_forward;
+        match parameter {
+            Parameter::SYSTEM_INERTIA => Some(inertia),
+            Parameter::ACCELERATION_FEED_FORWARD_GAIN => Some(gain),
+            _ => None,
         }
     }
 

@@ -6,7 +6,7 @@ use profile_generic::interpolation::{
     FineInterpolator, InterpolatorConfig, MAX_EXTRAPOLATION, Motion, Quality, TargetUpdate, UpdateError,
 };
 use profile_generic::mode::{ModeSelection, OperatingMode};
-use profile_generic::quantity::{Position, Quantity, Velocity};
+use profile_generic::quantity::{Acceleration, Position, Quantity, Velocity};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::guard::{Bounds, Finding, Guard, Lead, Trip};
@@ -288,6 +288,12 @@ impl SetPoints {
         }
         interpolator.pass(self.acts_at);
         None
+    }
+
+    /// The acceleration of the set-points of this cycle.
+    pub fn acceleration(&self) -> Acceleration {
+        let interpolator = self.interpolator.as_ref();
+        interpolator.map_or(Acceleration::ZERO, |interpolator| interpolator.acceleration(self.acts_at))
     }
 
     /// Judges the command of this cycle, the last thing before it goes into the telegram.

@@ -2,14 +2,14 @@
 
 use profile_generic::fault::FaultCause;
 use profile_generic::image::{AxisCommand, AxisFeedback, CommandSet, FeedbackSet, StatusBits};
-use profile_generic::quantity::{Position, Velocity};
+use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::state::Report;
-use profile_generic::time::MonotonicTime;
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::overtravel::{Motion, Overtravel};
 use super::position_jump::Plausibility;
 use super::tolerance::ToleranceWatch;
-use super::velocimeter::Velocimeter;
+use super::velocimeter::{Accelerometer, Velocimeter};
 use super::{Limits, PositionJump, SILENCE_TIME_OUT};
 
 /// Conditions that are watched, each with whether it is there.
@@ -21,6 +21,8 @@ pub(super) struct Supervision {
     pub limits: Limits,
     /// For a drive that reports positions and no velocity.
     velocimeter: Velocimeter,
+    /// For a drive that reports no acceleration.
+    accelerometer: Accelerometer,
     plausibility: Plausibility,
     switches: Overtravel,
     software_limits: Overtravel,
@@ -36,6 +38,7 @@ impl Supervision {
         Self {
             limits,
             velocimeter: Velocimeter::default(),
+            accelerometer: Accelerometer::default(),
             plausibility: Plausibility::default(),
             switches: Overtravel::default(),
             software_limits: Overtravel::default(),
@@ -48,6 +51,7 @@ impl Supervision {
     /// The drive is another one, or counts from another place.
     pub fn restart(&mut self) {
         self.velocimeter.restart();
+        self.accelerometer = Accelerometer::default();
         self.plausibility.restart();
     }
 
@@ -74,6 +78,16 @@ impl Supervision {
     /// The velocity of a drive that reports none; `None` with its first position.
     pub fn velocity(&mut self, position: Position, at: MonotonicTime) -> Option<Velocity> {
         self.velocimeter.sample(position, at)
+    }
+
+    /// The acceleration of a drive that reports none, filtered; `None` with its first velocity.
+    pub fn acceleration(
+        &mut self,
+        velocity: Velocity,
+        at: MonotonicTime,
+        filter: DurationNs,
+    ) -> Option<Acceleration> {
+        self.accelerometer.sample(velocity, at, filter)
     }
 
     /// A position that the axis cannot have come to. `settled` is false while the drive may count from another place at any moment.

@@ -9,6 +9,7 @@ use profile_generic::state::Report;
 use profile_generic::time::MonotonicTime;
 
 use super::cyclic_values::CyclicValues;
+use super::encoder;
 use super::originals::Originals;
 use super::refusal::{parameter_refusal, refusal};
 use super::scaling::signal_octets;
@@ -19,7 +20,7 @@ use crate::engine::bus::{Answer, Buses, Purpose};
 use crate::engine::notice::Notice;
 use crate::engine::parameter::{ParameterJob, ParameterJobs};
 use crate::mapping::{
-    self, AttributeEntry, AttributeTable, Backing, Item, Mapping, MechanicalFact, Missing, Number,
+    self, AttributeEntry, AttributeTable, Backing, CipTables, Item, Mapping, MechanicalFact, Missing, Number,
     ParameterEntry, SequenceAttributes,
 };
 
@@ -96,12 +97,16 @@ impl Accesses {
                 return on.compare_datum(access, &entry, value, notice);
             }
             match missing {
-                Missing::Zero if program.has_parameters() => return on.compare_zero(access, &entry, notice),
-                Missing::Device if !program.can_go_by(parameter) => {
+                Missing::Device | Missing::DeviceOrZero if program.can_go_by(parameter) => {}
+                Missing::Zero | Missing::DeviceOrZero
+                    if program.has_parameters() && !program.is_own(parameter) =>
+                {
+                    return on.compare_zero(access, &entry, notice);
+                }
+                Missing::Stored => {}
+                Missing::Absent | Missing::Zero | Missing::Device | Missing::DeviceOrZero => {
                     return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
                 }
-                Missing::Device | Missing::Stored => {}
-                Missing::Absent | Missing::Zero => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
             }
             if let AccessOperation::Write(bytes) = &access.operation
                 && stopping_torque::is_stopping_torque(&entry)
@@ -179,12 +184,12 @@ impl Accesses {
         buses: &mut Buses,
         mapping: &Mapping,
     ) {
-        let Accessed { number, axis_number, attributes, axis, .. } = *on;
+        let Accessed { number, axis_number, place, attributes, axis, .. } = *on;
         self.give_back(on, buses);
-        let (place, purpose) = (on.axis_number, Purpose::Setting(on.number));
-        self.cyclic.advance(now, on.axis, |request| buses.access(place, request, purpose));
+        let purpose = Purpose::Setting(on.number);
+        self.cyclic.advance(now, on.axis, |request| buses.access(axis_number, request, purpose));
         let original = on.original(false);
-        let device = &mut *on.device;
+        let (device, tables) = (&mut *on.device, &mapping.cip);
         let originals = &mut self.originals;
         self.computed.advance(
             |_, job| job.next(mapping, axis),
@@ -202,7 +207,10 @@ impl Accesses {
                 let mut bytes = [0; 8];
                 let answer = match result.map_err(parameter_refusal) {
                     Ok(_) if what.write => Ok(0),
-                    Ok(value) => shown(attributes.get(what.attribute), value, &mut bytes),
+                    Ok(value) => {
+                        let reading = Reading { tables, device, place, axis };
+                        reading.shown(attributes.get(what.attribute), value, &mut bytes)
+                    }
                     Err(status) => Err(status),
                 };
                 device.complete_attribute(what.ticket, answer.map(|len| &bytes[..len]));
@@ -287,6 +295,7 @@ impl Accesses {
         on: &mut Accessed<'_>,
         answer: &Answer,
         (ticket, attribute, write): (u32, u16, bool),
+        tables: &CipTables,
         notice: &mut dyn FnMut(Notice),
     ) {
         if write && answer.result.is_ok() {
@@ -316,9 +325,9 @@ impl Accesses {
         let wanted = confirmation.map(|at| self.confirmations.remove(at).1);
         let result = match (&answer.result, &wanted) {
             (Err(failure), _) => Err(refusal(*failure)),
-            (Ok((data, _)), Some(wanted)) => on.confirm(attribute, wanted, data, notice),
+            (Ok((data, _)), Some(wanted)) => on.confirm(attribute, wanted, (data, tables), notice),
             (Ok(_), None) if write => Ok(0),
-            (Ok((data, _)), None) => on.read(attribute, data, &mut bytes),
+            (Ok((data, _)), None) => on.read(attribute, data, tables, &mut bytes),
         };
         on.device.complete_attribute(ticket, result.map(|len| &bytes[..len]));
     }
@@ -371,11 +380,11 @@ impl Accessed<'_> {
         &self,
         attribute: u16,
         wanted: &[u8],
-        data: &[u8],
+        (data, tables): (&[u8], &CipTables),
         notice: &mut dyn FnMut(Notice),
     ) -> Result<usize, GeneralStatus> {
         let mut bytes = [0; 8];
-        let len = self.read(attribute, data, &mut bytes)?;
+        let len = self.read(attribute, data, tables, &mut bytes)?;
         let entry = self.attributes.get(attribute).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let held = bytes.get(..len).unwrap_or(&[]);
         if entry.agree(wanted, held) {
@@ -515,10 +524,42 @@ impl Accessed<'_> {
     }
 
     /// What the drive has answered to a read, as the attribute; its length.
-    fn read(&self, attribute: u16, data: &[u8], bytes: &mut [u8; 8]) -> Result<usize, GeneralStatus> {
+    fn read(
+        &self,
+        attribute: u16,
+        data: &[u8],
+        tables: &CipTables,
+        bytes: &mut [u8; 8],
+    ) -> Result<usize, GeneralStatus> {
         let entry = self.attributes.get(attribute);
         let generic = held(self.attributes, self.axis, attribute).and_then(|held| held.decode(data));
-        shown(entry, generic.ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?, bytes)
+        let reading = Reading { tables, device: &*self.device, place: self.place, axis: self.axis };
+        reading.shown(entry, generic.ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?, bytes)
+    }
+}
+
+/// What a value that is read is shown by.
+struct Reading<'a> {
+    tables: &'a CipTables,
+    device: &'a MotionDevice,
+    place: usize,
+    axis: &'a AxisChannel,
+}
+
+impl Reading<'_> {
+    /// A generic value as the attribute; its length.
+    fn shown(
+        &self,
+        entry: Option<&AttributeEntry>,
+        generic: i64,
+        bytes: &mut [u8; 8],
+    ) -> Result<usize, GeneralStatus> {
+        let Some((entry, unit)) = entry.and_then(|entry| Some((entry, entry.feedback()?))) else {
+            return shown(entry, generic, bytes);
+        };
+        let nanounits = encoder::nanounits(self.tables, unit, (self.device, self.place), self.axis);
+        let nanounits = nanounits.ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
+        entry.from_encoder(generic, nanounits, bytes).map_err(|_| GeneralStatus::DEVICE_STATE_CONFLICT)
     }
 }
 

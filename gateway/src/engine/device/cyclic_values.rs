@@ -50,7 +50,7 @@ impl CyclicValues {
         octets: &mut [u8; 8],
     ) -> Option<usize> {
         let entry = attributes.get(id)?;
-        let Backing::Parameter { parameter, .. } = entry.backing else { return None };
+        let Backing::Parameter { parameter, feedback: None, .. } = entry.backing else { return None };
         let generic = &mapping.dictionaries.generic;
         let computation = generic.computation(parameter)?;
         let program = axis.south()?;
@@ -59,6 +59,7 @@ impl CyclicValues {
             program,
             axis.control(),
             |signal| axis.signal(signal),
+            |parameter| axis.kept(parameter),
             |_, parameter| self.fact(parameter),
         );
         let value = computation.value(&known).ok()?;
@@ -80,7 +81,7 @@ impl CyclicValues {
 
     /// A list may hold an attribute: the settings that it is computed from are read.
     pub fn prepare(&mut self, mapping: &Mapping, program: &DriveProgram, entry: &AttributeEntry) {
-        let Backing::Parameter { parameter, .. } = entry.backing else { return };
+        let Backing::Parameter { parameter, feedback: None, .. } = entry.backing else { return };
         let generic = &mapping.dictionaries.generic;
         let reads = generic.computation(parameter).into_iter().flat_map(|computation| &computation.reads);
         for parameter in reads.filter_map(|read| read.parameter) {
@@ -142,7 +143,7 @@ impl CyclicValues {
 pub(super) fn is_possible(mapping: &Mapping, program: &DriveProgram, entry: &AttributeEntry) -> bool {
     match entry.backing {
         Backing::Signal { signal, otherwise: Some(_), .. } => signal.is_command() || program.tells(signal),
-        Backing::Parameter { parameter, .. } => {
+        Backing::Parameter { parameter, feedback: None, .. } => {
             let generic = &mapping.dictionaries.generic;
             let is_setting = |parameter| generic.is_setting(parameter);
             generic

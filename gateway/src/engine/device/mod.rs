@@ -3,6 +3,7 @@
 mod access;
 mod axis;
 mod cyclic_values;
+mod encoder;
 mod member;
 mod originals;
 mod reactions;
@@ -322,7 +323,13 @@ impl DeviceChannel {
     }
 
     /// Takes the drive's answer to an access for an attribute; `false` when it is another device's.
-    pub fn answer(&mut self, answer: &Answer, axes: &[AxisChannel], notice: &mut dyn FnMut(Notice)) -> bool {
+    pub fn answer(
+        &mut self,
+        answer: &Answer,
+        mapping: &Mapping,
+        axes: &[AxisChannel],
+        notice: &mut dyn FnMut(Notice),
+    ) -> bool {
         let (Purpose::Attribute { device, .. } | Purpose::Original { device, .. } | Purpose::Setting(device)) =
             answer.purpose
         else {
@@ -339,7 +346,7 @@ impl DeviceChannel {
         match answer.purpose {
             Purpose::Attribute { ticket, attribute, write, .. } => {
                 let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-                accesses.answer(&mut on, answer, (ticket, attribute, write), notice);
+                accesses.answer(&mut on, answer, (ticket, attribute, write), &mapping.cip, notice);
             }
             Purpose::Original { write, .. } => member.accesses.original_answered(answer, write, notice),
             Purpose::Setting(_) => {

@@ -12,7 +12,7 @@ use profile_generic::time::DurationNs;
 use super::access::{generic_of, held};
 use super::axis::CipAxis;
 use super::scaling::number_of;
-use crate::engine::axis::{AxisChannel, Ramp, StopSettings, Tolerances};
+use crate::engine::axis::{AxisChannel, FeedForward, Ramp, StopSettings, Tolerances};
 use crate::mapping::{AttributeEntry, AttributeTable, Backing, SequenceAttributes};
 
 /// What a stop falls back to where the controller has set nothing.
@@ -96,6 +96,12 @@ impl Settings<'_> {
             flying_start: raw(rows.flying_start) != 0 && by_velocity,
             checks_overtravel: raw(rows.overtravel_checking) != 0,
             tolerances: self.tolerances(),
+            acceleration_filter: self
+                .attribute_of(Parameter::FEEDBACK_ACCELERATION_FILTER)
+                .and_then(|id| self.value(id))
+                .map(DurationNs)
+                .unwrap_or_default(),
+            feed_forward: self.feed_forward(),
         };
         let abort: Reaction = stopping.map(|row| row.abort).unwrap_or_default();
         let abort = cip.program().fault_action(abort);
@@ -153,6 +159,15 @@ impl Settings<'_> {
                 .unwrap_or_default(),
             over_torque: of(Parameter::OVER_TORQUE_LIMIT).map(Torque),
             over_torque_time: of(Parameter::OVER_TORQUE_LIMIT_TIME).map(DurationNs),
+        }
+    }
+
+    /// Torque that is fed forward to a drive that does not do it by itself.
+    fn feed_forward(&self) -> FeedForward {
+        let of = |parameter| self.attribute_of(parameter).and_then(|id| self.value(id)).unwrap_or(0);
+        FeedForward {
+            gain: of(Parameter::ACCELERATION_FEED_FORWARD_GAIN),
+            inertia: of(Parameter::SYSTEM_INERTIA),
         }
     }
 

@@ -8,7 +8,7 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::quantity::Quantity;
 use profile_generic::state::{Action, DriveState, Report, Request};
 
-use crate::cip_tables::MISSING;
+use crate::cip_tables::{MISSING, Times};
 use crate::device_link::DRIVE_ACTIONS;
 use crate::dictionary::AT_LIMIT;
 use crate::dictionary::{
@@ -125,7 +125,7 @@ fn of_builders(row: &str, key: &str) -> Option<Vec<&'static str>> {
         (_, "served_by") => vec!["device", "connection", "stored", "constant", "mechanics"],
         (_, "found_by") => vec!["box", "device"],
         (_, "drive_action") => named(&DRIVE_ACTIONS),
-        ("UnitRow", "times") => vec!["motion_count", "motion_unit"],
+        ("UnitRow", "times") => Times::NAMED.iter().map(|(word, _)| *word).collect(),
         ("SercosCaptureRow", "by") => vec!["latch", "counter", "input", "sequence"],
         (_, "confidence") => named(Confidence::NAMED),
         ("WordRow", "layout") => named(Layout::NAMED),

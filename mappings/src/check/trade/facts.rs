@@ -257,12 +257,15 @@ pub(super) const DISPLACEMENTS: &[(&str, f64)] = &[
     ("Meter", METRE),
 ];
 
-/// Units of CIP that follow the scaling of the axis (Table 5-2.8).
+/// Units of CIP that follow the scaling of the axis (Table 5-2.8), or that of its encoders (Table 5-2.33).
 pub(super) const SCALED_UNITS: &[(&str, &str)] = &[
     ("Position Control Units", "motion_count"),
     ("Velocity Control Units / Sec", "motion_unit"),
     ("Accel Control Units / Sec\u{b2}", "motion_unit"),
     ("Velocity Control Units / Sec\u{b2}", "motion_unit"),
+    ("Feedback n Counts", "feedback_count"),
+    ("Feedback n Units / Sec", "feedback_unit"),
+    ("Feedback n Units / Sec\u{b2}", "feedback_unit"),
 ];
 
 /// Ratios of the factor group of CiA 402: what a count is multiplied by, and what it is divided by.

@@ -17,12 +17,18 @@ const STORED_MAX: usize = 20;
 /// The parameter of an attribute that the gateway compares with others where a drive has none.
 const STOPPING_TORQUE: &str = "stopping_torque";
 
-/// Parameters of attributes that the gateway watches an axis by where a drive has none.
-const WATCHED: [&str; 4] = [
+/// Parameters of attributes that the gateway watches an axis by where a drive has none, or computes with.
+const WATCHED: [&str; 10] = [
     "velocity_error_tolerance",
     "velocity_error_tolerance_time",
     "over_torque_limit",
     "over_torque_limit_time",
+    "feedback_acceleration_filter",
+    "load_feedback_unit",
+    "load_feedback_resolution",
+    "load_feedback_interpolation",
+    "system_inertia",
+    "acceleration_feed_forward_gain",
 ];
 
 pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {

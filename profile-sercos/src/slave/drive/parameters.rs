@@ -33,6 +33,7 @@ mod attribute {
     pub const TORQUE_READ: u32 = 0x7121_0001;
     pub const GAIN: u32 = 0x0211_0001;
     pub const DELAY: u32 = 0x0111_0001;
+    pub const FILTER: u32 = 0x0011_0001;
     pub const CURRENT_READ: u32 = 0x7312_0001;
     pub const SPEED_READ: u32 = 0x7412_0001;
     pub const U16_READ: u32 = 0x7011_0001;
@@ -144,6 +145,7 @@ fn define_values(store: &mut Store, servo: &ServoParameters) {
             .unit(speed),
         value(Idn::VELOCITY_FEEDBACK_VALUE_1, a::VELOCITY_READ, "Velocity feedback value 1", Feedback)
             .unit(speed),
+        value(Idn::standard(156), a::POSITION_READ, "Velocity feedback value 2", Feedback).unit(speed),
         value(Idn::POSITION_COMMAND, a::POSITION, "Position command value", Both).unit(length),
         value(Idn::ADDITIVE_POSITION_COMMAND, a::POSITION, "Additive position command value", Both)
             .unit(length),
@@ -237,6 +239,7 @@ fn define_settings(store: &mut Store) {
         value(Idn::standard(101), a::DELAY, "Velocity loop integral action time", 100)
             .unit("ms")
             .range(0, 32_767),
+        value(Idn::standard(392), a::FILTER, "Velocity feedback filter", 0).unit("us").range(0, word),
         value(Idn::STANDSTILL_WINDOW, a::VELOCITY, "Standstill window", 1).range(1, double),
         value(Idn::VELOCITY_THRESHOLD, a::VELOCITY, "Velocity threshold n_x", 0).range(0, double),
         value(Idn::TORQUE_THRESHOLD, a::TORQUE_UNSIGNED, "Torque/force threshold T_x", 0).range(0, word),

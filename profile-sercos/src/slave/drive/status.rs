@@ -55,11 +55,10 @@ impl Drive {
         }
         let following = self.scales.position.counts(actual.following_error.0);
         store.set_number_of(Idn::FOLLOWING_DISTANCE, following);
-        let polarity = sign(store, Idn::VELOCITY_POLARITY_PARAMETER, 2);
-        store.set_number_of(
-            Idn::VELOCITY_FEEDBACK_VALUE_1,
-            polarity * self.scales.velocity.counts(actual.velocity.0),
-        );
+        for (idn, bit) in [(Idn::VELOCITY_FEEDBACK_VALUE_1, 2), (Idn::standard(156), 3)] {
+            let polarity = sign(store, Idn::VELOCITY_POLARITY_PARAMETER, bit);
+            store.set_number_of(idn, polarity * self.scales.velocity.counts(actual.velocity.0));
+        }
         let polarity = sign(store, Idn::TORQUE_POLARITY_PARAMETER, 2);
         store.set_number_of(Idn::TORQUE_FEEDBACK, polarity * self.scales.torque.counts(actual.torque.0));
         store.set_number_of(Idn::DC_BUS_VOLTAGE, actual.bus_voltage.0 / 1_000_000);
