@@ -174,15 +174,16 @@ pub(super) fn parameter_row(
     missing.map_or(Some(()), |missing| resolver.word("missing", missing, &REJECTED))?;
     let factor = factor.map_or(Some(Ratio::ONE), |factor| resolver.ratio("factor", factor));
     let (parameter, (to_drive, from_drive), factor) = (parameter?, ways?, factor?);
-    if parameter.parameter.is_of_vendor() {
-        vendor_ways(resolver, parameter, direction, (to_drive, from_drive));
+    // Of the catalogue, what is only read has nothing to be written.
+    if parameter.parameter.is_of_vendor() || (parameter.access == Access::Read && to_drive) {
+        expect_ways(resolver, parameter, direction, (to_drive, from_drive));
     }
     let (parameter, quantity) = (parameter.parameter, parameter.quantity);
     Some(ParameterRule { parameter, quantity, to_drive, from_drive, factor, at: () })
 }
 
 /// What is passed through to the drive is read from it, and written where it may be: nothing else knows the value.
-fn vendor_ways(
+fn expect_ways(
     resolver: &mut Resolver<'_>,
     parameter: &GenericParameter,
     direction: &Name,
