@@ -28,7 +28,7 @@ fn rig(configuration: &str, nameplate: &str) -> (Rig, Client) {
     let configuration = configuration.replacen("instance = 1\n", &format!("instance = 1\n{nameplate}"), 1);
     let settings = match configuration.contains("[south.sercos]") {
         true => Settings { configuration, ..Settings::default() },
-        false => Settings::without_line(&configuration),
+        false => Settings::without_line(configuration),
     };
     let mut rig = Rig::ready(settings);
     rig.connect(vec![Step::Dwell { seconds: 10_000.0 }]);

@@ -273,7 +273,7 @@ fn attributes_are_what_the_table_of_truths_says() {
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
     let with_nameplate =
         |text: &str| text.replacen("instance = 1\n", &format!("instance = 1\n{NAMEPLATE}"), 1);
-    let settings = |text: &str| Settings::without_line(&with_nameplate(text));
+    let settings = |text: &str| Settings::without_line(with_nameplate(text));
     let mut cells: BTreeMap<u16, Vec<String>> = BTreeMap::new();
     let mut counts = Vec::new();
     for (bus, settings) in BUSES.into_iter().zip([
