@@ -355,7 +355,7 @@ pub enum Notice {
         /// Why that was refused.
         why: Refused,
     },
-    /// The controller would set something that the drive has otherwise and lets nobody set.
+    /// The controller would set something that drive or configuration have otherwise, and that nobody can set.
     NotEqual {
         /// Number of the axis.
         axis: u8,
@@ -363,8 +363,10 @@ pub enum Notice {
         attribute: u16,
         /// What the controller wants.
         wanted: Option<Number>,
-        /// What the drive has.
+        /// What drive or configuration have.
         held: Option<Number>,
+        /// It is what the configuration has.
+        configured: bool,
     },
     /// The drive did not take back what it had before the last controller: it keeps what that has set.
     NotReturned {
@@ -603,6 +605,9 @@ impl fmt::Display for Notice {
             Self::Strangers { device, count, from, why } => {
                 let s = if *count == 1 { "" } else { "s" };
                 write!(f, "device {device}: refused {count} datagram{s}, the last one from {from}: {why}")
+            }
+            Self::NotEqual { attribute, wanted: Some(wanted), held: Some(held), configured: true, .. } => {
+                write!(f, "attribute {attribute} cannot be set to {wanted}: the configuration has {held}")
             }
             Self::NotEqual { attribute, wanted: Some(wanted), held: Some(held), .. } => {
                 write!(f, "attribute {attribute} cannot be set to {wanted}: the drive has {held}, and only it can change that")

@@ -62,7 +62,7 @@ fn data_of_the_configuration_are_read_and_compared() {
         // The drive says otherwise, and it is the drive's.
         let current = f32::from_le_bytes(ask(GET, RATED_CURRENT, &[]).1.try_into().expect("a REAL"));
         assert!((current - 9.9).abs() > 0.1, "{bus}: {current}");
-        let said = "attribute 1327 cannot be set to 1.375: the drive has 1.25, and only it can change that";
+        let said = "attribute 1327 cannot be set to 1.375: the configuration has 1.25";
         assert!(rig.told().contains(said), "{bus}: {}", rig.told());
     }
 }

@@ -401,7 +401,7 @@ impl Accessed<'_> {
         notice: &mut dyn FnMut(Notice),
     ) -> GeneralStatus {
         let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
-        notice(Notice::NotEqual { axis, attribute, wanted, held });
+        notice(Notice::NotEqual { axis, attribute, wanted, held, configured: false });
         GeneralStatus::INVALID_ATTRIBUTE_VALUE
     }
 
@@ -440,7 +440,10 @@ impl Accessed<'_> {
                 self.device.complete_attribute(access.ticket, Ok(&[]));
             }
             AccessOperation::Write(wanted) => {
-                return Err(self.not_equal(access.id, (entry.number(wanted), entry.number(held)), notice));
+                let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
+                let (attribute, wanted, held) = (access.id, entry.number(wanted), entry.number(held));
+                notice(Notice::NotEqual { axis, attribute, wanted, held, configured: true });
+                return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
             }
         }
         Ok(())
