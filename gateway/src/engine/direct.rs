@@ -255,8 +255,7 @@ impl DirectNorth {
         (Self { requests: taken, answers: given, active: None }, DirectEnd { requests, answers })
     }
 
-    /// Answers the access that has ended, and begins the next one.
-    /// Gives what a drive was asked to take.
+    /// Answers the access that has ended, and begins the next one. Gives the axis and the item that are written by it.
     pub(super) fn exchange(
         &mut self,
         exchange: &mut Exchange<'_>,

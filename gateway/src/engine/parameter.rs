@@ -119,15 +119,13 @@ impl ParameterJob {
         // What the drive itself has goes first.
         let is_computed = axis.south().is_none_or(|program| !has(program, self.parameter));
         let computation = mapping.dictionaries.generic.computation(self.parameter);
-        let request = match computation.filter(|_| is_computed) {
-            Some(computation) => self.compute(computation, axis),
-            None if let Some(value) = self.datum(axis) => {
-                Err(self.wanted.map_or(Ok(value), |_| Err(ParameterFailure::ReadOnly)))
-            }
-            None => match self.wanted {
-                Some(wanted) => self.write(self.parameter, wanted, axis),
-                None => self.read(self.parameter, Asked::Value, axis),
-            },
+        let datum = axis.south().and_then(|program| program.datum(self.parameter));
+        let request = match (computation.filter(|_| is_computed), datum, self.wanted) {
+            (Some(computation), ..) => self.compute(computation, axis),
+            (None, Some(value), None) => Err(Ok(value)),
+            (None, Some(_), Some(_)) => Err(Err(ParameterFailure::ReadOnly)),
+            (None, None, Some(wanted)) => self.write(self.parameter, wanted, axis),
+            (None, None, None) => self.read(self.parameter, Asked::Value, axis),
         };
         match request {
             Ok(Some(access)) => Next::Ask(access),
@@ -137,11 +135,6 @@ impl ParameterJob {
                 Next::Done(result)
             }
         }
-    }
-
-    /// What the configuration has of it.
-    fn datum(&self, axis: &AxisChannel) -> Option<i64> {
-        axis.south()?.datum(self.parameter)
     }
 
     /// Why the value is not written, by what the tables say of the parameter.

@@ -417,8 +417,8 @@ impl FineInterpolator {
         }
     }
 
-    /// The acceleration of the fine set-points at `now`: the commanded one, or how the velocity or the position changes. None where no
-    /// update leads on.
+    /// The acceleration of the fine set-points at `now`: the commanded one, or how the velocity or the position changes. Zero where no
+    /// update goes on.
     pub fn acceleration(&self, now: MonotonicTime) -> Acceleration {
         let segment = self.segments.first().filter(|segment| now.since(segment.start) <= segment.follow);
         segment.map_or(Acceleration::ZERO, |segment| segment.acceleration_at(now))

@@ -3,17 +3,18 @@
 
 use std::collections::BTreeSet;
 
-use axisbridge::config::Config;
 use axisbridge::mapping::{Access, Mapping, Truth};
-use axisbridge::translate::Stage;
+use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::millis;
-use axisbridge_tests::rig::{Rig, Settings};
+use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
 use profile_cip::device::axis_state::AxisState;
+use profile_sercos::slave::parameter::Definition;
 use profile_sercos::wire::idn::Idn;
 
 use super::drive_parameters;
-use super::truths::{Bench, GET, OK, SET, another, changed, held};
+use super::settings::stopped;
+use super::truths::{Bench, GET, OK, SET, another, changed, held, rehearse, truths};
 
 /// The controller is gone, and another one connects that sets nothing.
 fn reconnect(rig: &mut Rig) {
@@ -32,16 +33,13 @@ fn what_a_controller_has_changed_in_a_drive_ends_with_its_connection() {
         ("SERCOS", Settings::default(), 12),
         ("CANopen", Settings::without_line(include_str!("can.toml")), 12),
     ] {
-        let config = Config::parse(&settings.configuration, "rig.toml").expect("sound");
-        let stage = Stage::rehearse(&config, mapping.clone()).expect("it can be commissioned");
-        let axis =
-            stage.axes.iter().find(|axis| axis.device == 0 && axis.instance == 1).expect("the first axis");
-        let truths = stage.mapping.truths(&axis.attributes, &axis.south);
+        let stage = rehearse(&mapping, &settings);
         let mut bench = Bench::start(bus, settings);
         let first = held(&bench.rig);
         let mut places = BTreeSet::new();
         let mut values = Vec::new();
-        for row in truths.iter().filter(|row| row.truth != Truth::Absent && row.access == Access::Set) {
+        for row in truths(&stage).iter().filter(|row| row.truth != Truth::Absent && row.access == Access::Set)
+        {
             let known = mapping.dictionaries.cip.attribute_by_id(row.id).expect("of the dictionary");
             let (_, value) = bench.ask(GET, row.id, &[]);
             let Some(other) = another(known, &value) else { continue };
@@ -79,22 +77,39 @@ fn what_somebody_else_has_set_meanwhile_stays() {
         });
     };
     let set = |rig: &mut Rig, value: f32| {
-        let client = axisbridge_tests::rig::explicit::Client::connect(rig, axisbridge_tests::rig::CONTROLLER);
+        let client = Client::connect(rig, CONTROLLER);
         assert_eq!(client.ask(rig, SET, 1, Some(441), &value.to_le_bytes()).0, OK);
     };
     connect(&mut bench.rig);
-    set(&mut bench.rig, 50.0);
-    assert_eq!(drive_parameters::held(&bench, kpp), 300);
+    set(&mut bench.rig, 100.0);
+    assert_eq!(drive_parameters::held(&bench, kpp), 600);
     bench.rig.kill_controller();
     bench.rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
-    assert_eq!(drive_parameters::held(&bench, kpp), 300, "nothing is done behind a connection");
+    assert_eq!(drive_parameters::held(&bench, kpp), 600, "nothing is done behind a connection");
     let reply = bench.say("write turntable S-0-0104 7.00");
     assert!(reply.starts_with("ok "), "{reply}");
     reconnect(&mut bench.rig);
     assert_eq!(drive_parameters::held(&bench, kpp), 700);
     // And is what the next connection gives back.
-    set(&mut bench.rig, 50.0);
+    set(&mut bench.rig, 100.0);
     reconnect(&mut bench.rig);
     assert_eq!(drive_parameters::held(&bench, kpp), 700);
-    assert_ne!(by_itself, 700);
+    assert_eq!(by_itself, 300);
+}
+
+/// A drive that does not take back what it had keeps what the controller has set, and the log says so.
+#[test]
+fn what_a_drive_does_not_take_back_is_in_the_log() {
+    let kpp = Idn::standard(104);
+    let (mut rig, client) = stopped(Rig::ready(Settings::default()));
+    let held = |rig: &Rig| rig.line.slaves()[0].store().number_of(kpp);
+    assert_eq!(client.ask(&mut rig, SET, 1, Some(441), &100.0_f32.to_le_bytes()).0, OK);
+    assert_eq!(held(&rig), 600, "300 before");
+    // From now on it takes nothing below what it has.
+    let narrow = Definition::value(kpp, 0x0211_0001, "Position loop Kv-factor", 600).unit("1000/min");
+    rig.line.slaves_mut()[0].store_mut().define(narrow.range(600, 65_535));
+    reconnect(&mut rig);
+    assert_eq!(held(&rig), 600);
+    let said = "S-0-0104 keeps what the last controller has set, instead of what the drive had before: the drive refuses it";
+    assert!(rig.told().contains(said), "{}", rig.told());
 }

@@ -7,6 +7,8 @@ use profile_cip::controller::{AttributeSet, AxisSet, Step};
 use profile_cip::device::axis_state::AxisState;
 use profile_sercos::wire::idn::Idn;
 
+use super::loops::near;
+
 const GET: u8 = 0x0E;
 const SET: u8 = 0x10;
 const OK: u8 = 0;
@@ -101,12 +103,6 @@ impl Bench {
             rig.engine.axes()[usize::from(axis - 1)].feedback().velocity.get() > nano
         });
     }
-}
-
-#[track_caller]
-fn near(what: &str, value: Result<f64, u8>, expected: f64, tolerance: f64) {
-    let is_near = value.is_ok_and(|value| (value - expected).abs() <= tolerance);
-    assert!(is_near, "{what}: {value:02X?}, expected {expected} within {tolerance}");
 }
 
 fn jog(axis: u8, velocity: f64, acceleration: f64) -> Step {

@@ -88,7 +88,7 @@ fn get(rig: &mut Rig, client: &Client, axis: u8, id: u16) -> Result<f64, u8> {
 }
 
 #[track_caller]
-fn near(what: &str, value: Result<f64, u8>, expected: f64, tolerance: f64) {
+pub(super) fn near(what: &str, value: Result<f64, u8>, expected: f64, tolerance: f64) {
     let is_near = value.is_ok_and(|value| (value - expected).abs() <= tolerance);
     assert!(is_near, "{what}: {value:02X?}, expected {expected} within {tolerance}");
 }

@@ -1,10 +1,9 @@
 //! Data of motor and power stage that the drive does not show and the configuration has.
 
 use axisbridge_tests::rig::explicit::Client;
-use axisbridge_tests::rig::motion::millis;
-use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
-use profile_cip::controller::Step;
-use profile_cip::device::axis_state::AxisState;
+use axisbridge_tests::rig::{BOX, Rig, Settings};
+
+use super::settings::stopped;
 
 const GET: u8 = 0x0E;
 const SET: u8 = 0x10;
@@ -30,13 +29,7 @@ fn rig(configuration: &str, nameplate: &str) -> (Rig, Client) {
         true => Settings { configuration, ..Settings::default() },
         false => Settings::without_line(configuration),
     };
-    let mut rig = Rig::ready(settings);
-    rig.connect(vec![Step::Dwell { seconds: 10_000.0 }]);
-    rig.run_until(millis(20_000), "Stopped", |rig| {
-        rig.engine.devices()[0].axis_states().all(|(_, state)| state == AxisState::Stopped)
-    });
-    let client = Client::connect(&mut rig, CONTROLLER);
-    (rig, client)
+    stopped(Rig::ready(settings))
 }
 
 #[test]

@@ -49,7 +49,7 @@ fn settings(configuration: &str) -> Settings {
 }
 
 /// A rig whose axes stand, with a client of their device.
-fn stopped(mut rig: Rig) -> (Rig, Client) {
+pub(super) fn stopped(mut rig: Rig) -> (Rig, Client) {
     rig.connect(vec![Step::Dwell { seconds: 10_000.0 }]);
     rig.run_until(millis(20_000), "Stopped", |rig| {
         rig.engine.devices()[0].axis_states().all(|(_, state)| state == AxisState::Stopped)

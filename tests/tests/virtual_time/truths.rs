@@ -268,6 +268,19 @@ impl Bench {
     }
 }
 
+/// A gateway with these settings and its commissioned drives.
+pub(super) fn rehearse(mapping: &Mapping, settings: &Settings) -> Stage {
+    let config = Config::parse(&settings.configuration, "rig.toml").expect("sound");
+    Stage::rehearse(&config, mapping.clone()).expect("it can be commissioned")
+}
+
+/// What is said of the attributes of the first axis.
+pub(super) fn truths(stage: &Stage) -> Vec<AttributeTruth<'_>> {
+    let mut axes = stage.axes.iter();
+    let axis = axes.find(|axis| axis.device == 0 && axis.instance == 1).expect("the first axis");
+    stage.mapping.truths(&axis.attributes, &axis.south)
+}
+
 #[test]
 fn attributes_are_what_the_table_of_truths_says() {
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
@@ -281,11 +294,8 @@ fn attributes_are_what_the_table_of_truths_says() {
         settings(include_str!("can.toml")),
         settings(include_str!("devicenet.toml")),
     ]) {
-        let config = Config::parse(&settings.configuration, "rig.toml").expect("sound");
-        let stage = Stage::rehearse(&config, mapping.clone()).expect("it can be commissioned");
-        let axis =
-            stage.axes.iter().find(|axis| axis.device == 0 && axis.instance == 1).expect("the first axis");
-        let truths = stage.mapping.truths(&axis.attributes, &axis.south);
+        let stage = rehearse(&mapping, &settings);
+        let truths = truths(&stage);
         let mut bench = Bench::start(bus, settings);
         for row in &truths {
             let known = mapping.dictionaries.cip.attribute_by_id(row.id).expect("of the dictionary");

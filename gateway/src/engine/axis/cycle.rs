@@ -110,14 +110,14 @@ impl AxisChannel {
         }
     }
 
-    /// Adds the torque that is fed forward to the trim, for a drive that adds it both in the mode that it is told and in the one that it
-    /// shows; `lead` is whether set-points lead the axis.
+    /// Adds the torque that is fed forward to the trim, for a drive that adds it both in the commanded mode and in the one that it
+    /// shows; `lead` is whether the axis follows set-points.
     fn feed_forward(&mut self, shown: ModeSelection, lead: bool) {
-        let told = self.command.selection();
+        let commanded = self.command.selection();
         let feed_forward = self.start_stop.settings.feed_forward;
         let Some(program) = self.link.program().filter(|_| lead && feed_forward.gain != 0) else { return };
-        let closes_loop = matches!(told.mode, OperatingMode::Position | OperatingMode::Velocity);
-        let carried = program.carries(told) & program.carries(shown);
+        let closes_loop = matches!(commanded.mode, OperatingMode::Position | OperatingMode::Velocity);
+        let carried = program.carries(commanded) & program.carries(shown);
         if !closes_loop
             || !carried.contains(CommandSet::TORQUE_OFFSET)
             || !program.keeps(Parameter::ACCELERATION_FEED_FORWARD_GAIN)

@@ -43,7 +43,7 @@ pub enum Purpose {
     },
     /// What a drive has before a controller's first write, or its way back there.
     Original {
-        /// Index in the box of the device of the axis.
+        /// Index of the axis's device.
         device: u8,
         /// It goes back.
         write: bool,

@@ -390,18 +390,19 @@ impl Accessed<'_> {
         if entry.agree(wanted, held) {
             return Ok(0);
         }
-        Err(self.not_equal(attribute, (entry.number(wanted), entry.number(held)), notice))
+        Err(self.not_equal(attribute, (entry.number(wanted), entry.number(held)), false, notice))
     }
 
-    /// The answer to a value that is not the one that is held, and both in the log.
+    /// The answer to a value that is not the one that the drive holds, or the configuration if it is `configured`; both go into the log.
     fn not_equal(
         &self,
         attribute: u16,
         (wanted, held): (Option<Number>, Option<Number>),
+        configured: bool,
         notice: &mut dyn FnMut(Notice),
     ) -> GeneralStatus {
         let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
-        notice(Notice::NotEqual { axis, attribute, wanted, held, configured: false });
+        notice(Notice::NotEqual { axis, attribute, wanted, held, configured });
         GeneralStatus::INVALID_ATTRIBUTE_VALUE
     }
 
@@ -417,7 +418,7 @@ impl Accessed<'_> {
             let is_zero = matches!(wanted, Some(Number::Integer(0)))
                 || matches!(wanted, Some(Number::Real(value)) if value == 0.0);
             if !is_zero {
-                return Err(self.not_equal(access.id, (wanted, Some(Number::Integer(0))), notice));
+                return Err(self.not_equal(access.id, (wanted, Some(Number::Integer(0))), false, notice));
             }
         }
         self.keep(access)
@@ -440,10 +441,8 @@ impl Accessed<'_> {
                 self.device.complete_attribute(access.ticket, Ok(&[]));
             }
             AccessOperation::Write(wanted) => {
-                let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
-                let (attribute, wanted, held) = (access.id, entry.number(wanted), entry.number(held));
-                notice(Notice::NotEqual { axis, attribute, wanted, held, configured: true });
-                return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE);
+                let values = (entry.number(wanted), entry.number(held));
+                return Err(self.not_equal(access.id, values, true, notice));
             }
         }
         Ok(())
@@ -464,7 +463,7 @@ impl Accessed<'_> {
         match &access.operation {
             AccessOperation::Write(bytes) if agrees(bytes) => self.keep(access),
             AccessOperation::Write(bytes) => {
-                Err(self.not_equal(access.id, (entry.number(bytes), Some(value)), notice))
+                Err(self.not_equal(access.id, (entry.number(bytes), Some(value)), false, notice))
             }
             AccessOperation::Read(_) if self.device.attribute(self.place, access.id).is_ok_and(agrees) => {
                 self.keep(access)

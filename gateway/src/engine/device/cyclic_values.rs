@@ -38,6 +38,8 @@ pub(super) struct CyclicValues {
     next: (usize, MonotonicTime),
     /// A list has used one since then.
     used: bool,
+    /// The program of the drive that they are of.
+    programs: u64,
 }
 
 impl CyclicValues {
@@ -74,23 +76,47 @@ impl CyclicValues {
         }
     }
 
-    /// The drive has got another program.
-    pub fn commission(&mut self) {
-        self.settings.clear();
+    /// Whether the drive has got another program since [`CyclicValues::commission`].
+    pub fn is_outdated(&self, axis: &AxisChannel) -> bool {
+        self.programs != axis.programs()
     }
 
-    /// A list may hold an attribute: the settings that it is computed from are read.
-    pub fn prepare(&mut self, mapping: &Mapping, program: &DriveProgram, entry: &AttributeEntry) {
-        let Backing::Parameter { parameter, feedback: None, .. } = entry.backing else { return };
+    /// Takes the program of a drive: the settings of what it lets be in lists will be read. Gives the attributes that it does not let
+    /// be there.
+    pub fn commission<'a>(
+        &'a mut self,
+        mapping: &'a Mapping,
+        attributes: &'a AttributeTable,
+        (programs, program): (u64, &'a DriveProgram),
+    ) -> impl Iterator<Item = u16> + 'a {
+        self.programs = programs;
+        self.settings.clear();
+        let entries = attributes.entries().iter();
+        entries.filter(|entry| !self.admit(mapping, program, entry)).map(|entry| entry.id)
+    }
+
+    /// Whether the drive lets an attribute be in a list, as far as that is for the drive to say.
+    fn admit(&mut self, mapping: &Mapping, program: &DriveProgram, entry: &AttributeEntry) -> bool {
+        let parameter = match entry.backing {
+            Backing::Signal { signal, otherwise: Some(_), .. } => {
+                return signal.is_command() || program.tells(signal);
+            }
+            Backing::Parameter { parameter, feedback: None, .. } => parameter,
+            _ => return true,
+        };
         let generic = &mapping.dictionaries.generic;
-        let reads = generic.computation(parameter).into_iter().flat_map(|computation| &computation.reads);
-        for parameter in reads.filter_map(|read| read.parameter) {
+        let Some(computation) = generic.computation(parameter) else { return true };
+        if !computation.is_cyclic(program, |parameter| generic.is_setting(parameter)) {
+            return false;
+        }
+        for parameter in computation.reads.iter().filter_map(|read| read.parameter) {
             let is_known = self.settings.iter().any(|known| known.parameter == parameter);
             if !is_known && generic.is_setting(parameter) && program.parameter(parameter).is_some() {
                 // What finds no room has no value.
                 let _ = self.settings.try_push(Setting { parameter, value: None, due: true });
             }
         }
+        true
     }
 
     /// A connection was opened: what was known is old.
@@ -136,21 +162,6 @@ impl CyclicValues {
         if let Some(setting) = self.settings.iter_mut().find(|known| known.parameter == parameter) {
             setting.value = value;
         }
-    }
-}
-
-/// Whether a drive with this program lets an attribute that is not in the device be in a cyclic list.
-pub(super) fn is_possible(mapping: &Mapping, program: &DriveProgram, entry: &AttributeEntry) -> bool {
-    match entry.backing {
-        Backing::Signal { signal, otherwise: Some(_), .. } => signal.is_command() || program.tells(signal),
-        Backing::Parameter { parameter, feedback: None, .. } => {
-            let generic = &mapping.dictionaries.generic;
-            let is_setting = |parameter| generic.is_setting(parameter);
-            generic
-                .computation(parameter)
-                .is_some_and(|computation| computation.is_cyclic(program, is_setting))
-        }
-        _ => true,
     }
 }
 

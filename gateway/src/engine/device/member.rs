@@ -12,7 +12,6 @@ use profile_generic::time_base::TimeBase;
 
 use super::access::{Accessed, Accesses};
 use super::axis::CipAxis;
-use super::cyclic_values;
 use super::reactions;
 use super::scaling::{Scaling, signal_octets};
 use super::stopping::{Settings, StopDefaults, Stopping};
@@ -48,8 +47,6 @@ pub(super) struct Member {
     node_fault: Option<SystemTime>,
     /// The action of the device in the last exchange.
     action: DriveAction,
-    /// The program of the drive by which the device knows what cannot be in cyclic lists.
-    listed_by: u64,
     /// What the reactions of the axis were made of; `None` while they are nobody's.
     reactions: Option<(Option<u64>, u32)>,
 }
@@ -74,7 +71,6 @@ impl Member {
             accesses: Accesses::default(),
             node_fault: None,
             action: DriveAction::None,
-            listed_by: 0,
             reactions: None,
         })
     }
@@ -141,21 +137,11 @@ impl Member {
             image.events = self.scaling.checkable(image.events);
             image.captured_at = system_stamp(time, axis.feedback().at);
         });
-        if axis.programs() != self.listed_by
-            && let Some(program) = axis.south()
-        {
-            self.listed_by = axis.programs();
-            let computed = &mut self.accesses.cyclic;
-            computed.commission();
-            let entries = self.scaling.attributes().entries().iter();
-            let never = entries.filter(|entry| {
-                let is_possible = cyclic_values::is_possible(mapping, program, entry);
-                if is_possible {
-                    computed.prepare(mapping, program, entry);
-                }
-                !is_possible
-            });
-            device.set_not_cyclic(place, never.map(|entry| entry.id));
+        let computed = &mut self.accesses.cyclic;
+        if let Some(program) = axis.south().filter(|_| computed.is_outdated(axis)) {
+            let attributes = self.scaling.attributes();
+            let refused = computed.commission(mapping, attributes, (axis.programs(), program));
+            device.set_not_cyclic(place, refused);
         }
         let (settings, sequence) = self.stopping.settings(Settings {
             rows: &mapping.cip.sequence,

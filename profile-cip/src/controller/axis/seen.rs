@@ -103,16 +103,16 @@ impl Seen {
         unwind: Option<u32>,
         at: SystemTime,
     ) -> Option<i64> {
-        let position = match actual.position? {
-            within if let Some(unwind) = unwind => {
+        let position = match (actual.position?, unwind) {
+            (within, Some(unwind)) => {
                 let within = match within {
                     ActualPosition::Dint(position) => i64::from(position),
                     ActualPosition::Lint(position) => position,
                 };
                 i64::from(actual.unwind_count?) * i64::from(unwind) + within
             }
-            ActualPosition::Dint(raw) => self.actual.map_or(i64::from(raw), |near| unroll(near, raw)),
-            ActualPosition::Lint(position) => position,
+            (ActualPosition::Dint(raw), None) => self.actual.map_or(i64::from(raw), |near| unroll(near, raw)),
+            (ActualPosition::Lint(position), None) => position,
         };
         let elapsed = seconds(at - self.at);
         if let Some(before) = self.actual

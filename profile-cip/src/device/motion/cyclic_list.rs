@@ -5,10 +5,10 @@
 //! that was never used gives way to the next one, so two are kept.
 //!
 //! The standard promises that what a list carries is read in every update and applied in the next one. Values stored in
-//! the device keep that promise, and so do signals and what is computed from them, which the owner of the device publishes in every
-//! cycle ([`CyclicLists::publish`]), as far as the drive has them ([`CyclicLists::set_refused`]). A parameter of the drive, which only the service channel reaches, cannot; it is refused
-//! with its own status ("attribute not gettable", "attribute not settable") instead of being served from a copy of
-//! unknown age. Neither can a string, whose length would move what stands behind it.
+//! the device keep that promise, and so do signals and what is computed from them, which the owner of the device publishes in
+//! every cycle ([`CyclicLists::publish`]), as far as the drive has them ([`CyclicLists::set_refused`]). A parameter of the
+//! drive, which only the service channel reaches, cannot; it is refused with its own status ("attribute not gettable", "attribute not
+//! settable") instead of being served from a copy of unknown age. Neither can a string, whose length would move what stands behind it.
 //!
 //! A trim ([`Entry::is_trim`]) is written by a list only. It goes with the set-points of its own update and is stored nowhere:
 //! an update that does not carry it means zero.
