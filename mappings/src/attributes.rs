@@ -29,7 +29,15 @@ impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Integer(value) => write!(f, "{value}"),
-            Self::Real(value) => write!(f, "{value}"),
+            Self::Real(value) => {
+                // A REAL as short as it is, and not with what it lacks to the number that was meant.
+                #[allow(clippy::cast_possible_truncation)]
+                let short = *value as f32;
+                if f64::from(short).to_bits() == value.to_bits() {
+                    return write!(f, "{short}");
+                }
+                write!(f, "{value}")
+            }
         }
     }
 }

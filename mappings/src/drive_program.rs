@@ -10,6 +10,7 @@ use profile_generic::program::{
     ActionTable, BitPattern, CommandProgram, Conversion, ConversionReport, FeedbackProgram, Field,
     MAX_FIELDS, StateTable, Trackers, Width,
 };
+use profile_generic::quantity::Velocity;
 use profile_generic::state::{Action, Report};
 use profile_generic::time::DurationNs;
 use profile_sercos::wire::idn::Idn;
@@ -17,6 +18,7 @@ use profile_sercos::wire::idn::Idn;
 use super::capture_program::{CaptureProgram, Place};
 use super::item::Item;
 use super::mechanics::Mechanics;
+use crate::own_values::OF_CONFIGURATION;
 
 /// Operation modes of one axis: the slots S-0-0032..35 and S-0-0284..287.
 pub const MAX_MODES: usize = 8;
@@ -325,8 +327,8 @@ pub struct DriveProgram {
     pub(super) shares_target: bool,
 }
 
-/// Most values of parameters that a drive does not show.
-pub const DATA_MAX: usize = 32;
+/// Most values of parameters that a drive does not show: those of the nameplates, and the number of the power stage.
+pub const DATA_MAX: usize = OF_CONFIGURATION.len() + 1;
 
 /// A fault or warning in a diagnostic word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -382,6 +384,21 @@ impl DriveProgram {
             Parameter::OVER_TORQUE_LIMIT | Parameter::OVER_TORQUE_LIMIT_TIME => {
                 self.feedback.fields().any(|field| field.signal == Signal::TorqueActual)
             }
+            Parameter::TORQUE_THRESHOLD
+            | Parameter::UNDER_TORQUE_LIMIT
+            | Parameter::UNDER_TORQUE_LIMIT_TIME => self.tells(Signal::TorqueActual),
+            Parameter::VELOCITY_THRESHOLD => {
+                self.tells(Signal::VelocityActual) || self.derives(Signal::VelocityActual)
+            }
+            Parameter::OVER_SPEED_USER_LIMIT | Parameter::ZERO_SPEED => self.rated_velocity().is_some(),
+            Parameter::MOTOR_TEMPERATURE_USER_LIMIT => {
+                self.tells(Signal::Temperature) || self.reads(Parameter::MOTOR_TEMPERATURE)
+            }
+            Parameter::DRIVE_TEMPERATURE_USER_LIMIT => self.reads(Parameter::DRIVE_TEMPERATURE),
+            Parameter::BUS_OVERVOLTAGE_USER_LIMIT | Parameter::BUS_UNDERVOLTAGE_USER_LIMIT => {
+                self.datum(Parameter::BUS_NOMINAL_VOLTAGE).is_some()
+                    && (self.tells(Signal::BusVoltage) || self.reads(Parameter::BUS_VOLTAGE))
+            }
             Parameter::STOPPING_TORQUE => {
                 let limits = [Parameter::TORQUE_LIMIT_POSITIVE, Parameter::TORQUE_LIMIT_NEGATIVE];
                 limits.iter().all(|limit| self.parameter(*limit).is_some())
@@ -406,18 +423,46 @@ impl DriveProgram {
         }
     }
 
+    /// Whether the drive has a parameter that can be read.
+    fn reads(&self, parameter: Parameter) -> bool {
+        self.parameter(parameter).is_some_and(|held| held.from_drive.is_some())
+    }
+
+    /// Rated velocity of the motor as a velocity of the axis, by the nameplate in the configuration; `None` where nobody knows it.
+    #[must_use]
+    pub fn rated_velocity(&self) -> Option<Velocity> {
+        if let Some(velocity) = self.datum(Parameter::MOTOR_LINEAR_RATED_VELOCITY) {
+            return Some(Velocity(velocity));
+        }
+        const TURN: i128 = 1_000_000_000_000_000;
+        let of_motor = i128::from(self.datum(Parameter::MOTOR_RATED_VELOCITY)?);
+        let turns = i128::from(self.motor_turns_per_unit().filter(|turns| *turns > 0)?);
+        i64::try_from(of_motor * TURN / turns).ok().map(Velocity)
+    }
+
     /// Whether the drive does by itself, in a unit of its own, what a parameter that it lacks is for.
     #[must_use]
     pub fn is_own(&self, parameter: Parameter) -> bool {
         parameter == Parameter::ACCELERATION_FEED_FORWARD_GAIN && self.feeds_forward
     }
 
-    /// Whether the gateway keeps a value itself that the drive lacks, for what is computed from it.
+    /// Whether the gateway has a value itself that the drive lacks, for what is computed from it.
     #[must_use]
     pub fn keeps(&self, parameter: Parameter) -> bool {
-        matches!(parameter, Parameter::SYSTEM_INERTIA | Parameter::ACCELERATION_FEED_FORWARD_GAIN)
-            && self.parameter(parameter).is_none()
-            && self.can_go_by(parameter)
+        let is_kept = match parameter {
+            Parameter::SYSTEM_INERTIA | Parameter::ACCELERATION_FEED_FORWARD_GAIN => {
+                self.can_go_by(parameter)
+            }
+            Parameter::MOTOR_USE => {
+                self.tells(Signal::TorqueActual) && self.datum(Parameter::MOTOR_THERMAL_TIME).is_some()
+            }
+            Parameter::DRIVE_USE => {
+                self.tells(Signal::TorqueActual) && self.datum(Parameter::DRIVE_THERMAL_TIME).is_some()
+            }
+            Parameter::HEARD_TIME => true,
+            _ => false,
+        };
+        is_kept && self.parameter(parameter).is_none()
     }
 
     /// Whether the gateway knows the loops of the drive by its profile: it has parameters.
@@ -831,7 +876,7 @@ impl DriveProgram {
         self.parameters.get(at)
     }
 
-    /// Sets the data that the configuration has of motor and power stage, up to [`DATA_MAX`]. What the drive shows itself counts more.
+    /// Sets the data that the configuration has of motor and power stage, up to `DATA_MAX`. What the drive shows itself counts more.
     pub fn set_data(&mut self, data: &[(Parameter, i64)]) {
         self.data =
             data.iter().copied().filter(|(of, _)| self.parameter(*of).is_none()).take(DATA_MAX).collect();

@@ -1,4 +1,6 @@
-//! The mapping tables between CIP Motion, the generic drive model, SERCOS and CiA 402: format, check, compile, explain.
+#![doc = include_str!("../README.md")]
+//!
+//! # Parts
 //!
 //! ```text
 //! TOML files --load--> Tables --resolve--> Mapping --compile(axis)--> CipProgram, AttributeTable
@@ -10,53 +12,6 @@
 //! line, column and key ([`finding`]). [`check`] finds what only the whole shows. Compiling makes flat programs for one axis;
 //! what can still go wrong then lies with the axis or the drive. No translation of an attribute, IDN, object, state, mode or
 //! fault is code.
-//!
-//! # Your own tables
-//!
-//! An [`Overlay`] has the rows of your machine; the rest comes from the tables in the binary. Load it, check it, compile a
-//! program for an axis, and ask which row made a value:
-//!
-//! ```
-//! use mappings::finding::{Findings, Severity};
-//! use mappings::{AxisUnits, Mapping, Overlay, SercosAxis, TableTexts, check};
-//! use profile_generic::mode::OperatingMode;
-//! use profile_generic::parameter::Parameter;
-//!
-//! // Load: one row for the drives of one machine. `TableTexts::load` takes files and folders.
-//! let own = r#"
-//!     format = 1
-//!     overlay = "drives of line 9"
-//!
-//!     [[generic-sercos.parameter]]
-//!     parameter = "jerk_limit"
-//!     missing = "reject"
-//! "#;
-//! let mut texts = TableTexts::embedded();
-//! texts.overlays.push(Overlay::new("line-9.toml", own));
-//!
-//! // Check: findings have a code, a severity and a place.
-//! let outcome = check::texts(Some(texts), Findings::default());
-//! assert_eq!(outcome.findings.count(Severity::Error), 0, "{}", outcome.findings);
-//! let mapping: Mapping = outcome.mapping.unwrap();
-//!
-//! // Compile: a rotary axis in position control on a drive that takes whatever commissioning writes.
-//! let axis = SercosAxis {
-//!     units: AxisUnits::default(),
-//!     modes: [OperatingMode::Position.into()].into_iter().collect(),
-//!     set_scaling: true,
-//!     ..SercosAxis::default()
-//! };
-//! let facts = mapping.facts_of_obedient(&axis)?;
-//! let program = mapping.sercos_program(&axis, &facts)?;
-//! assert!(program.parameter(Parameter::JERK_LIMIT).is_some());
-//!
-//! // Explain: the row that a value comes from.
-//! let row = mapping.parameter_row(Parameter::JERK_LIMIT).unwrap();
-//! assert_eq!(row.to_string(), "line-9.toml:6 [[parameter]] jerk_limit");
-//! # Ok::<(), mappings::SercosError>(())
-//! ```
-//!
-//! `mappings/tests/own_tables.rs` is a test that a repository with tables of its own would have.
 
 mod attributes;
 mod capture_program;
@@ -85,6 +40,7 @@ mod mechanics;
 mod numbers;
 mod origin;
 mod overlay;
+pub mod own_values;
 mod places;
 mod resolver;
 mod rows;
@@ -135,8 +91,8 @@ pub use dictionary::{
     Trust, Word, networks,
 };
 pub use drive_program::{
-    CachedStatus, DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeProcedure, Order, ParameterEntry,
-    Procedure, ProcedureBy, Telegram,
+    CachedStatus, DATA_MAX, DriveProgram, FaultRow, MAX_MODES, MODE_SHIFT, ModeProcedure, Order,
+    ParameterEntry, Procedure, ProcedureBy, Telegram,
 };
 pub use drive_rows::Full;
 pub use item::{Attribute, Item, Object};

@@ -1,5 +1,6 @@
 //! Where the values of the generic model are: in the controller's profile, and in those of the drives.
 
+use crate::own_values::{OF_CONFIGURATION, OF_GATEWAY};
 use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 
@@ -42,6 +43,12 @@ impl Mapping {
         if parameter == Parameter::MOTOR_TURNS_PER_UNIT {
             return "computes it from the scaling of the drive";
         }
+        if parameter == Parameter::POWER_STRUCTURE_AXIS_ID {
+            return "has it from the configuration of the axis";
+        }
+        if OF_GATEWAY.contains(&parameter) {
+            return "has it from what it sees of the drive";
+        }
         if parameter == Parameter::OWN_ACCELERATION_FEED_FORWARD {
             return "feeds no acceleration forward to a drive that does it itself";
         }
@@ -53,6 +60,9 @@ impl Mapping {
             _ => None,
         });
         match missing {
+            _ if OF_CONFIGURATION.contains(&parameter) => {
+                "has it from the nameplate in the configuration where the drive has none"
+            }
             Some(Missing::Device | Missing::DeviceOrZero) => "goes by it where the drive has none",
             Some(Missing::Zero) => "takes 0 only where the drive has none",
             Some(Missing::Stored) => "stores it where the drive has none",

@@ -126,6 +126,7 @@ impl Mapping {
         let name = self.parameter_name(parameter);
         if let Some(computation) = self.dictionaries.generic.computation(parameter)
             && drive.parameter(parameter).is_none()
+            && drive.datum(parameter).is_none()
         {
             return match computation.is_possible(drive) {
                 true => (Truth::Computed, self.formula(&name.to_string())),

@@ -1,4 +1,6 @@
-//! CANopen and the drive profile CiA 402 on it: frames, object dictionary, master and node roles.
+#![doc = include_str!("../README.md")]
+//!
+//! # Parts
 //!
 //! * [`wire`]: what stands in the frames, as values; one file per kind of frame.
 //! * [`sdo`]: both ends of an SDO channel.

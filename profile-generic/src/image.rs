@@ -195,6 +195,10 @@ bitflags! {
         const POSITIVE_LIMIT_SWITCH = 1 << 26;
         /// The switch at the end of the way backward is active.
         const NEGATIVE_LIMIT_SWITCH = 1 << 27;
+        /// The velocity is below the threshold that the controller has set.
+        const VELOCITY_THRESHOLD = 1 << 28;
+        /// The torque is above the threshold that the controller has set.
+        const TORQUE_THRESHOLD = 1 << 29;
 
         // Bits above are kept when they come from a newer table.
         const _ = !0;
@@ -202,6 +206,9 @@ bitflags! {
 }
 
 impl StatusBits {
+    /// What the gateway evaluates by what the controller has set, whatever the drive shows.
+    pub const THRESHOLDS: Self = Self::VELOCITY_THRESHOLD.union(Self::TORQUE_THRESHOLD);
+
     /// What is wired to the drive: it counts while the drive is heard.
     pub const INPUTS: Self = Self::HOME_SWITCH
         .union(Self::LIMIT_SWITCHES)
@@ -238,6 +245,8 @@ impl StatusBits {
         (Self::LIMIT_SWITCHES, "limit_switches"),
         (Self::POSITIVE_LIMIT_SWITCH, "positive_limit_switch"),
         (Self::NEGATIVE_LIMIT_SWITCH, "negative_limit_switch"),
+        (Self::VELOCITY_THRESHOLD, "velocity_threshold"),
+        (Self::TORQUE_THRESHOLD, "torque_threshold"),
     ];
 
     /// The single bit with this exact name.

@@ -1,5 +1,8 @@
-//! The drive model in the middle of Axisbridge: the generic power drive system (PDS) interface of IEC
-//! 61800-7-1.
+#![doc = include_str!("../README.md")]
+//!
+//! # The model
+//!
+//! The generic power drive system (PDS) interface of IEC 61800-7-1.
 //!
 //! Nothing crosses from one drive profile to another except through the types of this crate. It depends on no
 //! other part of Axisbridge, opens no socket and reads no clock.

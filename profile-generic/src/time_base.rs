@@ -13,7 +13,7 @@
 
 use crate::time::{DurationNs, MonotonicTime, SystemTime};
 
-/// A difference beyond this is a step. Below, [`SLEW_PPB`] removes it within a tenth of a second.
+/// A difference beyond this is a step. Below, `SLEW_PPB` removes it within a tenth of a second.
 pub const STEP_THRESHOLD: DurationNs = DurationNs::from_micros(100);
 
 /// Time constant of the slew.

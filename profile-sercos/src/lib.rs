@@ -1,4 +1,6 @@
-//! SERCOS III: telegrams, phases, service channel, master and slave roles.
+#![doc = include_str!("../README.md")]
+//!
+//! # Parts
 //!
 //! * [`wire`]: what stands in the Ethernet frame and in the service channel, as values.
 //! * [`master`]: the master role, from the first CP0 telegram to cyclic operation.

@@ -2,6 +2,7 @@
 //! engine alone.
 
 use std::cell::Cell;
+use std::net::SocketAddrV4;
 use std::rc::Rc;
 
 use allocation_counter::{measure, opt_out};
@@ -18,14 +19,18 @@ use axisbridge_tests::rig::motion::{at_full_speed, in_motion, long_moves, millis
 use axisbridge_tests::rig::network::Knobs;
 use axisbridge_tests::rig::ports::TamperCan;
 use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
+use profile_cip::assembly::Control;
 use profile_cip::controller::sets::DataSets;
 use profile_cip::controller::{AxisSet, ControllerConfig, Event, Limits, Misbehaviour, Step};
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::device::drive_link::DriveImage;
-use profile_cip::wire::class1::CLASS1_HEADER_LEN;
+use profile_cip::wire::ConnectionTriad;
+use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram};
+use profile_cip::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
 use profile_cip::wire::motion::codes::{ControlMode, EventChecking};
 use profile_cip::wire::motion::event::ExtendedEventData;
 use profile_cip::wire::motion::{CommandPosition, CommandValues};
+use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
 use profile_generic::can::{Frame, Id};
 use profile_generic::fault::FaultCause;
 use profile_generic::fault_set::FaultSet;
@@ -156,15 +161,15 @@ fn a_drive_that_is_plugged_in_while_another_axis_moves_allocates_nothing() {
     ];
     rig.connect_with(config, program);
     rig.run_until(millis(5_000), "full speed", |rig| rig.velocity(0) > 4_900_000_000);
-    let found = weigh(&mut rig, 4_000, |rig, number| match number {
+    let found = weigh(&mut rig, 5_000, |rig, number| match number {
         100 => {
             let config = SlaveConfig { address: 2, classes, ..SlaveConfig::default() };
             rig.line.append(Slave::new(&config, Drive::new(linear()).expect("the servo works")));
             rig.line.mend(1);
         }
         // Pulled out, and in again.
-        2_500 => rig.line.cut(1),
-        2_600 => rig.line.mend(1),
+        3_000 => rig.line.cut(1),
+        3_100 => rig.line.mend(1),
         _ => {}
     });
     let came =
@@ -250,6 +255,80 @@ fn the_fixed_format_allocates_nothing() {
     assert!(!other.get(), "an update of the other format came");
     assert!(rig.engine.axes()[0].counters().commands > applied + 600, "the axis was led");
     assert!(rig.torque_free(), "and stopped");
+}
+
+/// Opens a connection to the assemblies of the rig's box with two axes and the layout "position"; its O->T ID.
+fn open_assembly(rig: &mut Rig) -> u32 {
+    let direction = |size| NetworkParameters {
+        redundant_owner: false,
+        connection_type: ConnectionType::POINT_TO_POINT,
+        priority: Priority::SCHEDULED,
+        variable: false,
+        size,
+    };
+    let open = ForwardOpen {
+        large: false,
+        priority_tick: 5,
+        timeout_ticks: 157,
+        o_to_t_id: 0,
+        t_to_o_id: 9,
+        triad: ConnectionTriad { connection_serial: 1, originator_vendor: 2, originator_serial: 3 },
+        timeout_multiplier: 2,
+        o_to_t_rpi_us: 2_000,
+        o_to_t: direction(38),
+        t_to_o_rpi_us: 2_000,
+        t_to_o: direction(42),
+        transport: Transport { server: false, trigger: Trigger::CYCLIC, class: 1 },
+        path: &[0x20, 4, 0x24, 151, 0x2C, 150, 0x2C, 100],
+    };
+    let mut data = vec![0; open.buffer_len()];
+    open.emit(&mut data).expect("it fits");
+    let client = Client::connect(rig, CONTROLLER);
+    let (status, data) = client.request(rig, 0x54, &[0x20, 6, 0x24, 1], &data);
+    assert_eq!(status, 0);
+    ForwardOpenReply::parse(&data).expect("a reply").o_to_t_id
+}
+
+#[test]
+fn an_axis_moved_through_assemblies_and_its_lost_connection_allocate_nothing() {
+    let assembly = "assembly = { layout = \"position\" }\n\n[device.identity]";
+    let text = BOX.replacen("[device.identity]", assembly, 1);
+    let mut rig = Rig::ready(Settings { configuration: text, ..Settings::default() });
+    let connection_id = open_assembly(&mut rig);
+    let mut fastest = 0;
+    let found = weigh(&mut rig, 1_200, |rig, number| {
+        fastest = fastest.max(rig.velocity(0));
+        // Silence from then on.
+        if number >= 900 {
+            return;
+        }
+        let word = match number {
+            0..20 => Control::empty(),
+            20..300 => Control::ENABLE,
+            _ => Control::ENABLE | Control::START,
+        };
+        let mut data = [0; 36];
+        data[0] = 1;
+        data[4..6].copy_from_slice(&word.bits().to_le_bytes());
+        for (place, value) in [(8, 5_000_000_i32), (12, 1_000_000), (16, 10_000_000)] {
+            data[place..place + 4].copy_from_slice(&value.to_le_bytes());
+        }
+        let [low, high, ..] = number.to_le_bytes();
+        let datagram = Class1Datagram {
+            connection_id,
+            encapsulation_sequence: number,
+            sequence_count: u16::from_le_bytes([low, high]),
+            data: &data,
+        };
+        let mut bytes = [0; 64];
+        let len = datagram.emit(&mut bytes).expect("it fits");
+        rig.inject_datagram(&bytes[..len], SocketAddrV4::new(CONTROLLER, 2222));
+    });
+    assert_eq!(found, []);
+    assert!(fastest > 900_000_000, "it was at speed: {fastest}");
+    let fault = rig.engine.axes()[0].fault().map(|fault| fault.cause);
+    assert_eq!(fault, Some(FaultCause::COMMAND_LOST));
+    assert!(rig.torque_free());
 }
 
 #[test]

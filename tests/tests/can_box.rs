@@ -229,6 +229,23 @@ fn scan(binary: &Path) {
     }
 }
 
+/// A first configuration of both drives is written, and has no error.
+fn init(guest: &Guest) {
+    let path = guest.folder.join("init.toml");
+    let output = Command::new(&guest.binary)
+        .args(["init", "--interface", "vcan0", "--output"])
+        .arg(&path)
+        .stdin(Stdio::null())
+        .output()
+        .expect("init can be started");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(printed.starts_with(&format!("{}: 2 axes, ", path.display())), "{printed}");
+    let text = read(&path);
+    assert!(text.contains("interface = \"vcan0\"") && text.matches("[[axis]]").count() == 2, "{text}");
+}
+
 /// What is changed of the example in any guest.
 const PATIENT: [(&str, &str); 2] = [
     ("192.168.1.10", "127.0.0.2"),
@@ -239,6 +256,7 @@ fn run_the_program() {
     let guest = Guest::new();
     let _drives = guest.drives("vcan0");
     scan(&guest.binary);
+    init(&guest);
     let changes = [
         ("\"can0\"", "\"vcan0\""),
         ("set_bit_rate = true\n", ""),

@@ -2,6 +2,7 @@
 //!
 //! Data goes to standard output, errors and progress to standard error. Exit status 0 is success, 1 findings or failure, 2 usage.
 
+mod assembly;
 mod attributes;
 mod check;
 mod decode;
@@ -9,14 +10,20 @@ mod demo;
 mod dictionary;
 mod doctor;
 mod eds;
+mod faults;
 mod gateway_client;
+mod init;
+mod log;
+mod manual;
 pub(crate) mod param;
+mod plc;
 mod progress;
 mod report;
 mod run;
 mod scan;
 mod scan_can;
 mod script;
+mod service_manager;
 mod signal;
 mod simulate;
 mod snapshot;
@@ -48,6 +55,10 @@ enum Command {
     Run(RunArguments),
     /// Show what a running gateway does now: buses, system time, axes and faults.
     Status(StatusArguments),
+    /// Show the last lines of the log of a running gateway.
+    Log(LogArguments),
+    /// Show the faults that are present, and the history of faults of each axis.
+    Faults(FaultsArguments),
     /// Read, write, back up, restore and compare the parameters of a drive, and execute its commands.
     #[command(subcommand)]
     Param(param::ParamCommand),
@@ -55,12 +66,16 @@ enum Command {
     Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
     Eds(EdsArguments),
+    /// Show the connection points, sizes and offsets of devices with assemblies.
+    Assembly(AssemblyArguments),
     /// Show what each attribute of an axis is: live, compared, computed, stored or absent.
     Attributes(AttributesArguments),
     /// Check whether this host is fit for the gateway and its cycles.
     Doctor(DoctorArguments),
     /// List the drives on a bus, and print a first configuration.
     Scan(ScanArguments),
+    /// Write a first configuration for the drives on a bus. An existing file is never overwritten.
+    Init(InitArguments),
     /// Print the frames of a recording as an indented tree.
     Decode(DecodeArguments),
     /// Show how the mapping tables translate frames, and which row made each value.
@@ -72,6 +87,9 @@ enum Command {
     /// Run simulated drives or a simulated controller.
     #[command(subcommand)]
     Simulate(Simulate),
+    /// Write manual pages and shell completions, for packages.
+    #[command(hide = true)]
+    Manual(ManualArguments),
 }
 
 /// Arguments of `demo`.
@@ -121,6 +139,43 @@ struct StatusArguments {
     #[arg(long)]
     watch: bool,
     /// Print one JSON object; with `--watch` one a line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `log`.
+#[derive(Debug, Args)]
+struct LogArguments {
+    /// The Unix socket of the running gateway (`run --local`).
+    #[arg(long, value_name = "SOCKET", default_value = "/run/axisbridge/local")]
+    local: PathBuf,
+    /// How many of the newest lines (1 to 10000).
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    lines: u64,
+    /// Go on with new lines as they come, until Ctrl-C.
+    #[arg(long)]
+    follow: bool,
+    /// Only lines of this level, and of levels that matter more.
+    #[arg(long, value_name = "LEVEL", value_parser = ["error", "warn", "info", "debug", "trace"], default_value = "trace")]
+    level: String,
+    /// Only lines about this axis.
+    #[arg(long, value_name = "NAME")]
+    axis: Option<String>,
+    /// Print one JSON object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `faults`.
+#[derive(Debug, Args)]
+struct FaultsArguments {
+    /// The Unix socket of the running gateway (`run --local`).
+    #[arg(long, value_name = "SOCKET", default_value = "/run/axisbridge/local")]
+    local: PathBuf,
+    /// Only the axis with this name.
+    #[arg(long, value_name = "NAME")]
+    axis: Option<String>,
+    /// Print one JSON object.
     #[arg(long)]
     json: bool,
 }
@@ -194,6 +249,28 @@ struct EdsArguments {
     output: Option<PathBuf>,
 }
 
+/// Arguments of `assembly`.
+#[derive(Debug, Args)]
+struct AssemblyArguments {
+    /// The configuration of the gateway (TOML).
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Form of the output.
+    #[arg(long, value_enum, default_value_t = AssemblyFormat::Text)]
+    format: AssemblyFormat,
+}
+
+/// Form of the output of `assembly`.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum AssemblyFormat {
+    /// Lines for people.
+    Text,
+    /// One JSON document.
+    Json,
+    /// Tables for a page of documentation.
+    Markdown,
+}
+
 /// Arguments of `attributes`.
 #[derive(Debug, Args)]
 struct AttributesArguments {
@@ -226,10 +303,10 @@ struct DoctorArguments {
     json: bool,
 }
 
-/// Arguments of `scan`.
+/// Which bus `scan` and `init` look at.
 #[derive(Debug, Args)]
 #[command(group(ArgGroup::new("bus").required(true).args(["config", "interface"])))]
-struct ScanArguments {
+struct BusArguments {
     /// Scan the bus of this configuration, and show the differences.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -239,9 +316,34 @@ struct ScanArguments {
     /// The interface at the other end of the ring, or of a second line.
     #[arg(long, value_name = "IF2", requires = "interface")]
     ring: Option<String>,
+}
+
+/// Arguments of `scan`.
+#[derive(Debug, Args)]
+struct ScanArguments {
+    #[command(flatten)]
+    bus: BusArguments,
     /// Print one JSON object on standard output.
     #[arg(long)]
     json: bool,
+}
+
+/// Arguments of `init`.
+#[derive(Debug, Args)]
+struct InitArguments {
+    #[command(flatten)]
+    bus: BusArguments,
+    /// The file to write. It must not exist.
+    #[arg(long, value_name = "FILE", default_value = "gateway.toml")]
+    output: PathBuf,
+}
+
+/// Arguments of `manual`.
+#[derive(Debug, Args)]
+struct ManualArguments {
+    /// The folder that stands for /usr. It is created if it is not there.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
 }
 
 /// Arguments of `translate`.
@@ -459,8 +561,36 @@ enum Simulate {
     DevicenetDrive(DevicenetDriveArguments),
     /// Simulate a CIP Motion controller that configures, enables and moves the axes of a device, or runs a script.
     Controller(ControllerArguments),
+    /// Simulate a PLC that moves one axis through the assemblies of a device.
+    Plc(PlcArguments),
     /// Simulate a PTP grandmaster with a clock of its own. No clock of the host is set.
     Grandmaster(GrandmasterArguments),
+}
+
+/// Arguments of `simulate plc`.
+#[derive(Debug, Args)]
+struct PlcArguments {
+    /// The configuration of the gateway (TOML): address, layout and counts are taken from it.
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// The axis to move.
+    #[arg(long, value_name = "NAME")]
+    axis: String,
+    /// Where to, in revolutions or millimetres.
+    #[arg(long, value_name = "POSITION", allow_negative_numbers = true)]
+    to: f64,
+    /// Velocity, in these units per second.
+    #[arg(long, value_name = "V", value_parser = positive)]
+    velocity: f64,
+    /// Acceleration, in these units per second squared. Without it, the limit of the axis is used.
+    #[arg(long, value_name = "A", value_parser = positive)]
+    acceleration: Option<f64>,
+    /// Packet interval of both directions in microseconds.
+    #[arg(long, value_name = "US", default_value_t = 8000, value_parser = clap::value_parser!(u32).range(1000..=100_000))]
+    interval_us: u32,
+    /// Longest movement in seconds.
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    seconds: u32,
 }
 
 /// Arguments of `simulate sercos-drive`.
@@ -624,17 +754,23 @@ pub fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
+        Command::Log(arguments) => log::run(&arguments),
+        Command::Faults(arguments) => faults::run(&arguments),
         Command::Param(command) => param::run(&command),
         Command::Check(arguments) => check::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
+        Command::Assembly(arguments) => assembly::run(&arguments),
         Command::Attributes(arguments) => attributes::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Scan(arguments) => scan::run(&arguments),
+        Command::Init(arguments) => init::run(&arguments),
+        Command::Manual(arguments) => manual::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Translate(arguments) => translate::run(&arguments),
         Command::Snapshot(arguments) => snapshot::run(&arguments),
         Command::Dictionary(arguments) => dictionary::run(&arguments),
         Command::Simulate(Simulate::SercosDrive(arguments)) => simulate::sercos_drive(&arguments),
+        Command::Simulate(Simulate::Plc(arguments)) => plc::run(&arguments),
         Command::Simulate(Simulate::CanDrive(arguments)) => simulate::can_drive(&arguments),
         Command::Simulate(Simulate::DevicenetDrive(arguments)) => simulate::devicenet_drive(&arguments),
         Command::Simulate(Simulate::Controller(arguments)) => simulate::controller(&arguments),

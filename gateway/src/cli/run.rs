@@ -1,19 +1,24 @@
 //! `axisbridge run`: the box.
 
+use std::cell::RefCell;
 use std::io::IsTerminal as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tracing::{error, info, warn};
 use tracing_subscriber::EnvFilter;
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
 
+use super::service_manager::ServiceManager;
 use super::{CliError, RunArguments, has_colours};
 use crate::check::{Request, check};
 use crate::config::{Config, LogLevel};
 use crate::finding::{Finding, Findings, Severity};
+use crate::history::{EventRing, FaultHistory, Histories, LinesOf, RingLayer};
 use crate::mapping::Mapping;
 use crate::runner;
 use crate::settings::Store;
@@ -24,14 +29,21 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(200);
 /// Runs the box until it is asked to end.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     let (mut good, findings) = read(&arguments.config).map_err(|findings| refusal(&findings))?;
-    log_to_stderr(good.config.log_level);
+    let events = Arc::new(EventRing::default());
+    log_to_stderr(good.config.log_level, &events);
+    let in_memory = Arc::new(FaultHistory::default());
     tell(&findings);
     let [stop, hurry] = super::signal::stop_and_hurry_on_signals()?;
     let asked = Asked { stop, hurry, reload: super::signal::reload_on_hang_up()? };
     info!(name = good.config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
+    let manager = RefCell::new(ServiceManager::of_environment(Instant::now()));
     loop {
         let settings = Arc::new(Store::open(good.config.settings_file.as_deref())?);
-        match run_once(&good, arguments, &settings, &asked)? {
+        let directory = good.config.history_dir.as_deref();
+        let faults =
+            directory.map_or_else(|| Arc::clone(&in_memory), |path| Arc::new(FaultHistory::open(path)));
+        let histories = Histories { events: Arc::clone(&events), faults };
+        match run_once(&good, arguments, &settings, &histories, &asked, &manager)? {
             After::End { rested: true } => return Ok(ExitCode::SUCCESS),
             After::End { rested: false } => return Ok(ExitCode::FAILURE),
             After::Again(next) => good = next.map_or(good, |next| *next),
@@ -92,15 +104,22 @@ fn run_once(
     good: &Good,
     arguments: &RunArguments,
     settings: &Arc<Store>,
+    histories: &Histories,
     asked: &Asked,
+    manager: &RefCell<ServiceManager>,
 ) -> Result<After, CliError> {
-    let extras = runner::Extras { capture: arguments.capture.as_deref(), local: arguments.local.as_deref() };
+    let extras = runner::Extras {
+        capture: arguments.capture.as_deref(),
+        local: arguments.local.as_deref(),
+        histories: Some(histories),
+    };
     let running = runner::start(&good.config, good.mapping.clone(), extras, settings)?;
     let mut told = false;
     let mut next = None;
     let mut reloads = false;
     while !asked.stop.load(Ordering::Relaxed) && !running.wants_restart() && !reloads {
         std::thread::sleep(LOOK_INTERVAL);
+        manager.borrow_mut().look(Instant::now(), || running.status());
         if !told {
             told = true;
             let refused = running.realtime_report();
@@ -123,7 +142,15 @@ fn run_once(
     info!(
         "axisbridge stops: the axes stop, then the bus goes down; a second signal ends the wait for the axes"
     );
-    let stopped = running.stop(&|| asked.hurry.load(Ordering::Relaxed))?;
+    if stops {
+        manager.borrow_mut().stopping();
+    }
+    let status = running.reader();
+    // The wait for the axes can be longer than a watchdog is patient.
+    let stopped = running.stop(&|| {
+        manager.borrow_mut().look(Instant::now(), || status.read());
+        asked.hurry.load(Ordering::Relaxed)
+    })?;
     if let Some(dropped) = stopped.dropped.filter(|dropped| *dropped > 0) {
         warn!(dropped, "frames are missing in the recording");
     }
@@ -157,18 +184,21 @@ fn reload(path: &Path) -> Option<Box<Good>> {
     }
 }
 
-/// Logs to standard error; the environment variable `RUST_LOG` overrides the level of the file. The PTP library has lines for each
+/// Logs to standard error, and into the ring; the environment variable `RUST_LOG` overrides the level of the file. The PTP library has lines for each
 /// message, which nobody needs who does not ask for them.
-fn log_to_stderr(level: LogLevel) {
+fn log_to_stderr(level: LogLevel, ring: &Arc<EventRing>) {
     let own = match level {
         LogLevel::Error => level.name().to_owned(),
         level => format!("{},statime=warn", level.name()),
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(own));
-    let logger =
-        tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false);
+    let lines =
+        tracing_subscriber::fmt::layer().fmt_fields(LinesOf).with_writer(std::io::stderr).with_target(false);
     // A log file or a journal has no colours.
-    let logger = logger.with_ansi(std::io::stderr().is_terminal());
+    let lines = lines.with_ansi(std::io::stderr().is_terminal());
+    // The filter is that of both, so that the ring has what is logged.
+    let logger =
+        tracing_subscriber::registry().with(filter).with(lines).with(RingLayer::new(Arc::clone(ring)));
     // Refused only when a logger is set already.
     let _ = logger.try_init();
 }

@@ -7,7 +7,7 @@ use profile_generic::time::DurationNs;
 use profile_sercos::master::config::{MasterConfig, Ports};
 
 use super::progress::Progress;
-use super::{CliError, ScanArguments, print, scan_can, signal};
+use super::{BusArguments, CliError, ScanArguments, print, scan_can, signal};
 use crate::config::{Config, Link};
 use crate::engine::build::Host;
 use crate::engine::build::sercos::master_config;
@@ -24,15 +24,38 @@ const CYCLE_NS: u32 = 2_000_000;
 /// Longest time of a scan: 511 slaves with a busy service channel take less.
 const LIMIT: DurationNs = DurationNs::from_secs(120);
 
+/// What a scan has found.
+pub struct Scanned {
+    /// Remarks on what is there, and a configuration if there is a drive to begin with: the whole is a file that `axisbridge run`
+    /// takes.
+    pub text: String,
+    /// The text has a configuration.
+    pub has_starter: bool,
+    /// What is there, for programs.
+    pub json: serde_json::Value,
+    /// Something is there, and nothing is odd.
+    pub good: bool,
+}
+
 /// Looks at the bus and prints what is there.
 ///
 /// # Errors
-/// The configuration is faulty, the interface cannot be opened, the output cannot be written.
+/// As [`find`]; the output cannot be written.
 pub fn run(arguments: &ScanArguments) -> Result<ExitCode, CliError> {
+    let scanned = find(&arguments.bus, arguments.json)?;
+    let output = if arguments.json { format!("{:#}\n", scanned.json) } else { scanned.text };
+    print(output, if scanned.good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Looks at the bus, with its progress on standard error unless it is `quiet`.
+///
+/// # Errors
+/// The configuration is faulty, the interface cannot be opened.
+pub fn find(arguments: &BusArguments, quiet: bool) -> Result<Scanned, CliError> {
     if let Some(interface) = arguments.interface.as_deref().filter(|_| arguments.ring.is_none())
         && scan_can::is_can(interface)?
     {
-        return scan_can::run(interface, arguments.json);
+        return scan_can::find(interface, quiet);
     }
     let config = arguments.config.as_deref().map(Config::load).transpose()?;
     let mapping = Mapping::embedded()?;
@@ -74,7 +97,7 @@ pub fn run(arguments: &ScanArguments) -> Result<ExitCode, CliError> {
         Link::Interface { name, .. } => name,
     };
     let stop = signal::stop_on_signals()?;
-    let mut progress = Progress::new(arguments.json);
+    let mut progress = Progress::new(quiet);
     progress.step(&format!("scanning {interface}"));
     let mut scanner = Scanner::new(master)?;
     let end = clock::monotonic_now() + LIMIT;
@@ -92,18 +115,25 @@ pub fn run(arguments: &ScanArguments) -> Result<ExitCode, CliError> {
         clock::sleep_until(at)?;
     }
     let bus = scanner.finish();
-    let output = if arguments.json {
-        format!("{:#}\n", scan::json(&bus, &mapping.dictionaries.sercos))
-    } else {
-        report(&bus, &mapping, &link, interface, config.as_ref())
-    };
+    let starter = scan::starter(&bus, &link);
     let good =
         bus.findings.is_empty() && !bus.slaves.is_empty() && !bus.slaves.iter().any(|slave| slave.lost);
-    print(output, if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(Scanned {
+        text: report(&bus, &mapping, starter.as_deref(), interface, config.as_ref()),
+        has_starter: starter.is_some(),
+        json: scan::json(&bus, &mapping.dictionaries.sercos),
+        good,
+    })
 }
 
 /// What was found as remarks, and behind it a configuration: the whole is a file that `axisbridge run` takes.
-fn report(bus: &Bus, mapping: &Mapping, link: &Link, interface: &str, config: Option<&Config>) -> String {
+fn report(
+    bus: &Bus,
+    mapping: &Mapping,
+    starter: Option<&str>,
+    interface: &str,
+    config: Option<&Config>,
+) -> String {
     let mut remarks = format!("axisbridge scan of {interface}: ");
     remarks.push_str(&scan::text(bus, &mapping.dictionaries.sercos));
     if let Some(config) = config {
@@ -116,9 +146,9 @@ fn report(bus: &Bus, mapping: &Mapping, link: &Link, interface: &str, config: Op
         out.push_str(format!("# {line}").trim_end());
         out.push('\n');
     }
-    if let Some(starter) = scan::starter(bus, link) {
+    if let Some(starter) = starter {
         out.push('\n');
-        out.push_str(&starter);
+        out.push_str(starter);
     }
     out
 }

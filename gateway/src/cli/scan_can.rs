@@ -1,12 +1,12 @@
 //! `axisbridge scan` of a CAN bus.
 
-use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use profile_generic::time::DurationNs;
 
 use super::progress::Progress;
-use super::{CliError, print, signal};
+use super::scan::Scanned;
+use super::{CliError, signal};
 use crate::runner::port::CanSocketPort;
 use crate::scan::can::{self, Scanner};
 use crate::sys::can_socket::{self, CanSocket, OpenError};
@@ -29,16 +29,16 @@ pub fn is_can(interface: &str) -> Result<bool, CliError> {
     }
 }
 
-/// Looks at the bus and prints what is there.
+/// Looks at the bus, with its progress on standard error unless it is `quiet`.
 ///
 /// # Errors
-/// The interface cannot be opened, the output cannot be written.
-pub fn run(interface: &str, json: bool) -> Result<ExitCode, CliError> {
+/// The interface cannot be opened.
+pub fn find(interface: &str, quiet: bool) -> Result<Scanned, CliError> {
     let mut port = CanSocketPort::open(interface, InterfaceLock::take(interface)?)?;
     // A virtual interface has no rate.
     let rate = can_interface::state(interface).ok().and_then(|state| state.nominal);
     let stop = signal::stop_on_signals()?;
-    let mut progress = Progress::new(json);
+    let mut progress = Progress::new(quiet);
     progress.step(&format!("scanning {interface}"));
     let mut scanner = Scanner::new();
     loop {
@@ -53,22 +53,21 @@ pub fn run(interface: &str, json: bool) -> Result<ExitCode, CliError> {
         clock::sleep_until(scanner.wake_at().map_or(latest, |at| at.min(latest)))?;
     }
     let bus = scanner.finish();
-    let output = if json {
-        format!("{:#}\n", can::json(&bus))
-    } else {
-        let remarks = format!("axisbridge scan of {interface}: {}", can::text(&bus));
-        let mut out = String::new();
-        for line in remarks.lines() {
-            out.push_str(format!("# {line}").trim_end());
-            out.push('\n');
-        }
-        if let Some(starter) = can::starter(&bus, interface, rate) {
-            out.push('\n');
-            out.push_str(&starter);
-        }
-        out.push_str(&can::hints(&bus));
-        out
-    };
-    let good = bus.findings.is_empty() && !(bus.nodes.is_empty() && bus.unassigned.is_empty());
-    print(output, if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let mut text = String::new();
+    for line in format!("axisbridge scan of {interface}: {}", can::text(&bus)).lines() {
+        text.push_str(format!("# {line}").trim_end());
+        text.push('\n');
+    }
+    let starter = can::starter(&bus, interface, rate);
+    if let Some(starter) = &starter {
+        text.push('\n');
+        text.push_str(starter);
+    }
+    text.push_str(&can::hints(&bus));
+    Ok(Scanned {
+        text,
+        has_starter: starter.is_some(),
+        json: can::json(&bus),
+        good: bus.findings.is_empty() && !(bus.nodes.is_empty() && bus.unassigned.is_empty()),
+    })
 }

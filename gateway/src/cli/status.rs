@@ -17,7 +17,7 @@ const INTERVAL: Duration = Duration::from_secs(1);
 const LOOK: Duration = Duration::from_millis(50);
 
 /// How long the gateway may take to answer.
-const PATIENCE: Duration = Duration::from_secs(2);
+pub(super) const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Clears a terminal and goes to its upper left corner.
 const CLEAR: &str = "\x1b[H\x1b[2J";
@@ -59,7 +59,7 @@ fn exit(overview: &Overview) -> ExitCode {
 }
 
 /// The overview, as it came and as it is.
-fn ask(client: &mut GatewayClient) -> Result<(String, Overview), CliError> {
+pub(super) fn ask(client: &mut GatewayClient) -> Result<(String, Overview), CliError> {
     let reply = client.ask("box")?.last;
     let other = || format!("expected a reply `ok box {{...}}` of format {FORMAT}, got `{reply}`");
     let json = reply.strip_prefix("ok box ").ok_or_else(other)?;

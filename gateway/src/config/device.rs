@@ -2,10 +2,11 @@
 
 use std::net::Ipv4Addr;
 
+use profile_cip::assembly::Assemblies;
 use profile_cip::wire::motion::Format;
 use profile_generic::time::DurationNs;
 
-/// A CIP Motion device as controllers see it.
+/// A device as controllers see it: a CIP Motion device, or one with assemblies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Device {
     /// Name, unique among devices.
@@ -18,6 +19,8 @@ pub struct Device {
     pub power_structure_class_id: u32,
     /// Format of the motion connection; the fixed one only with a single axis.
     pub connection_format: Format,
+    /// The assemblies that its axes are moved through; `None` for a CIP Motion device.
+    pub assembly: Option<Assemblies>,
     /// Shortest controller update period accepted.
     pub update_period_min: DurationNs,
     /// Longest controller update period accepted.

@@ -24,13 +24,15 @@ pub struct File {
     pub time: Option<TimeTable>,
     /// Logging. Default: level `info`.
     pub log: Option<LogTable>,
+    /// The history of faults. Default: in memory only.
+    pub history: Option<HistoryTable>,
     /// The Modbus TCP server. Default: none.
     pub modbus: Option<ModbusTable>,
     /// The HTTP server with the state of the gateway. Default: none.
     pub http: Option<HttpTable>,
     /// Mapping tables. Default: the built-in ones.
     pub mappings: Option<MappingsTable>,
-    /// The CIP Motion devices seen by controllers, at least one.
+    /// The devices seen by controllers, at least one.
     #[schemars(length(min = 1, max = 64))]
     pub device: Vec<Spanned<DeviceTable>>,
     /// The axes, at least one, at most 64.
@@ -94,6 +96,15 @@ pub struct LogTable {
     /// `"error"`, `"warn"`, `"info"`, `"debug"` or `"trace"`. Default: `"info"`.
     #[schemars(transform = form::word(&check::log_levels()))]
     pub level: Option<Spanned<String>>,
+}
+
+/// `[history]`
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HistoryTable {
+    /// Directory in which the history of faults is kept, relative to the folder of this file. It is made if it is not there.
+    #[schemars(transform = form::path)]
+    pub directory: Spanned<String>,
 }
 
 /// `[modbus]`
@@ -183,6 +194,24 @@ pub struct DeviceTable {
     pub connection_format: Option<Spanned<String>>,
     /// The controller update periods (RPI) it accepts.
     pub update_period: Option<UpdatePeriodTable>,
+    /// Makes it a device with assemblies, which any class 1 scanner can connect to, in place of a CIP Motion device.
+    pub assembly: Option<Spanned<AssemblyTable>>,
+}
+
+/// `[device.assembly]`. Either `layout`, or `output` and `input`.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AssemblyTable {
+    /// A shipped layout: `"position"`, `"motion"`, `"speed"`, `"speed-basic"` or `"mixed"`. Default: `"position"`, unless fields are
+    /// given.
+    #[schemars(transform = form::word(&check::assembly::LAYOUTS))]
+    pub layout: Option<Spanned<String>>,
+    /// Fields that each axis has in the output assembly, in their order; with `control` and `mode`.
+    #[schemars(transform = form::list_of(&check::assembly::output_fields()))]
+    pub output: Option<Spanned<Vec<Spanned<String>>>>,
+    /// Fields that each axis has in the input assembly, in their order; with `status`.
+    #[schemars(transform = form::list_of(&check::assembly::input_fields()))]
+    pub input: Option<Spanned<Vec<Spanned<String>>>>,
 }
 
 /// `identity` of a `[[device]]`. The device type follows from the axes: 47, CIP Motion Encoder, if all of them are encoders; 48, CIP Motion
@@ -265,6 +294,8 @@ pub struct AxisTable {
     pub motor: Option<MotorTable>,
     /// Data of the power stage that the drive does not show. Default: only what the drive shows.
     pub converter: Option<ConverterTable>,
+    /// Data of the motor's encoder that the drive does not show. Default: only what the drive shows.
+    pub encoder: Option<EncoderTable>,
     /// How the captures of the drive are read: `cyclic`, `service-channel` or `off`. Default: `cyclic` on SERCOS, `service-channel` (SDO)
     /// on CAN.
     #[schemars(transform = form::word(&check::axis::EVENTS))]
@@ -298,6 +329,11 @@ pub struct LimitsTable {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotorTable {
+    /// Kind of motor: `"rotary-permanent-magnet"`, `"rotary-induction"`, `"linear-permanent-magnet"` or `"linear-induction"`. To be given on
+    /// an axis in millimetres. Default: a rotary one that nothing more is known of.
+    #[serde(rename = "type")]
+    #[schemars(transform = form::word(&check::nameplate::MOTORS))]
+    pub kind: Option<Spanned<String>>,
     /// Rated torque in Nm, or rated force in N.
     #[schemars(transform = form::positive)]
     pub rated_torque: Option<Spanned<f64>>,
@@ -322,6 +358,33 @@ pub struct MotorTable {
     /// Poles, twice the pairs of poles: 2 to 65534, even. Only of a rotary motor.
     #[schemars(range(min = 2, max = 65_534), extend("multipleOf" = 2))]
     pub poles: Option<Spanned<i64>>,
+    /// Pole pitch in mm. Only of a linear motor.
+    #[schemars(transform = form::positive)]
+    pub pole_pitch: Option<Spanned<f64>>,
+    /// Torque constant in Nm/A, or force constant in N/A, both of the effective current. Only of a motor with permanent magnets.
+    #[schemars(transform = form::positive)]
+    pub torque_constant: Option<Spanned<f64>>,
+    /// Effective voltage from phase to phase in V at 1000 revolutions per minute, or at 1 m/s. Only of a motor with permanent magnets.
+    #[schemars(transform = form::positive)]
+    pub voltage_constant: Option<Spanned<f64>>,
+    /// Time constant of its warming in s: with it the gateway estimates Motor Capacity.
+    #[schemars(transform = form::positive)]
+    pub thermal_time_constant: Option<Spanned<f64>>,
+    /// Inductance across the magnets in henries. Only of a motor with permanent magnets.
+    #[schemars(transform = form::positive)]
+    pub q_inductance: Option<Spanned<f64>>,
+    /// Inductance along the magnets in henries. Only of a motor with permanent magnets.
+    #[schemars(transform = form::positive)]
+    pub d_inductance: Option<Spanned<f64>>,
+    /// Rated frequency in Hz. Only of an induction motor.
+    #[schemars(transform = form::positive)]
+    pub rated_frequency: Option<Spanned<f64>>,
+    /// Magnetising current in A. Only of an induction motor.
+    #[schemars(transform = form::positive)]
+    pub flux_current: Option<Spanned<f64>>,
+    /// Resistance of a phase of the stator in ohms. Only of an induction motor.
+    #[schemars(transform = form::positive)]
+    pub stator_resistance: Option<Spanned<f64>>,
     /// Inertia in kg m², or mass of the moving part in kg.
     #[schemars(transform = form::positive)]
     pub inertia: Option<Spanned<f64>>,
@@ -349,6 +412,44 @@ pub struct ConverterTable {
     /// Rated output current in A.
     #[schemars(transform = form::positive)]
     pub rated_current: Option<Spanned<f64>>,
+    /// Rated output voltage in V.
+    #[schemars(transform = form::positive)]
+    pub rated_voltage: Option<Spanned<f64>>,
+    /// Rated output power in kW.
+    #[schemars(transform = form::positive)]
+    pub rated_power: Option<Spanned<f64>>,
+    /// Time constant of its warming in s: with it the gateway estimates Inverter Capacity.
+    #[schemars(transform = form::positive)]
+    pub thermal_time_constant: Option<Spanned<f64>>,
+    /// Where the DC bus has its power from: `"standalone"`, `"shared-ac-dc"`, `"shared-dc"` or `"shared-dc-non-cip-converter"`.
+    #[schemars(transform = form::word(&check::nameplate::BUSES))]
+    pub bus: Option<Spanned<String>>,
+    /// The mains that the power stage is set to: `"high"` for 115, 230 and 460 V, `"low"` for 100, 200 and 400 V.
+    #[schemars(transform = form::word(&check::nameplate::MAINS))]
+    pub mains: Option<Spanned<String>>,
+    /// Whether the drive has an enable input without which it gives no torque.
+    pub checks_enable_input: Option<bool>,
+}
+
+/// `encoder` of an `[[axis]]`: that of the motor.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EncoderTable {
+    /// Interface: `"digital-aqb"`, `"digital-aqb-uvw"`, `"digital-parallel"`, `"sine-cosine"`, `"sine-cosine-uvw"`, `"hiperface"`,
+    /// `"endat-sine-cosine"`, `"endat-digital"`, `"resolver"`, `"ssi"`, `"hiperface-dsl"`, `"biss-digital"`, `"integrated"`,
+    /// `"ssi-sine-cosine"`, `"ssi-aqb"` or `"biss-sine-cosine"`.
+    #[serde(rename = "type")]
+    #[schemars(transform = form::word(&check::nameplate::ENCODERS))]
+    pub kind: Option<Spanned<String>>,
+    /// Where it counts from: `"incremental"` from where it is at power-up, `"absolute"` from its own zero.
+    #[schemars(transform = form::word(&check::nameplate::STARTUPS))]
+    pub startup: Option<Spanned<String>>,
+    /// Revolutions that an absolute rotary encoder tells apart, 1 to 4294967295.
+    #[schemars(range(min = 1, max = u32::MAX))]
+    pub turns: Option<Spanned<i64>>,
+    /// Length of an absolute linear encoder in mm.
+    #[schemars(transform = form::positive)]
+    pub length: Option<Spanned<f64>>,
 }
 
 impl LimitsTable {

@@ -129,6 +129,14 @@ pub fn words<T>(known: &[(&'static str, T)]) -> impl Fn(&mut Schema) + use<T> {
     }
 }
 
+/// Words in an order, some of them more than once.
+pub fn list_of<T>(known: &[(&'static str, T)]) -> impl Fn(&mut Schema) + use<T> {
+    let words = names(known);
+    move |schema| {
+        schema.insert("items".to_owned(), json!({ "type": "string", "enum": words }));
+    }
+}
+
 /// At least one of the words, each once.
 pub fn some_words<T>(known: &[(&'static str, T)]) -> impl Fn(&mut Schema) + use<T> {
     let words = words(known);

@@ -70,6 +70,8 @@ pub struct Config {
     pub overlays: Vec<PathBuf>,
     /// Where what controllers set is kept; `None` keeps it until the process ends.
     pub settings_file: Option<PathBuf>,
+    /// Where the history of faults is kept; `None` keeps it until the process ends.
+    pub history_dir: Option<PathBuf>,
     /// The CIP Motion devices seen by controllers.
     pub devices: Vec<Device>,
     /// All axes, in the order of the file.
@@ -190,7 +192,7 @@ impl Written {
         let written = Self::parse_in(folder, &source, &name, findings).map(|mut written| {
             let config = &mut written.config;
             let paths = config.mappings_dir.iter_mut().chain(&mut config.overlays);
-            for path in paths.chain(&mut config.settings_file) {
+            for path in paths.chain(&mut config.settings_file).chain(&mut config.history_dir) {
                 *path = folder.join(&*path);
             }
             written

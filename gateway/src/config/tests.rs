@@ -69,7 +69,8 @@ fn defaults_are_those_of_the_documentation() {
         (&config.time, config.log_level, config.modbus.clone(), config.http),
         (&Time::default(), LogLevel::Info, None, None)
     );
-    assert_eq!((&config.mappings_dir, &config.settings_file, config.overlays.len()), (&None, &None, 0));
+    assert_eq!((&config.mappings_dir, &config.settings_file, &config.history_dir), (&None, &None, &None));
+    assert_eq!(config.overlays.len(), 0);
     let device = &config.devices[0];
     assert_eq!(
         (device.update_period_min, device.update_period_max),
@@ -486,13 +487,14 @@ fn paths_count_from_the_file() {
     let path = folder.join("box.toml");
     let text = GOOD
         .replace("[[device]]", "[mappings]\ndir = \"maps\"\noverlays = [\"own.toml\"]\n[[device]]")
-        .replace("[box]", "[box]\nsettings_file = \"set.toml\"");
+        .replace("[box]", "[history]\ndirectory = \"state\"\n[box]\nsettings_file = \"set.toml\"");
     std::fs::write(&path, text).unwrap();
     let config = Config::load(&path).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!(config.mappings_dir, Some(folder.join("maps")));
     assert_eq!(config.overlays, [folder.join("own.toml")]);
     assert_eq!(config.settings_file, Some(folder.join("set.toml")));
+    assert_eq!(config.history_dir, Some(folder.join("state")));
 }
 
 #[test]
@@ -504,7 +506,7 @@ fn the_reference_describes_every_key() {
         // The tables of the top level stand in their headings, without a row of their own.
         let shown = match key {
             "the_box" => "`[box]`".to_owned(),
-            "time" | "log" | "modbus" | "http" | "mappings" => format!("`[{key}]`"),
+            "time" | "log" | "history" | "modbus" | "http" | "mappings" => format!("`[{key}]`"),
             "device" | "axis" => format!("`[[{key}]]`"),
             "south" => "`[south]`".to_owned(),
             key => format!("`{key}`"),

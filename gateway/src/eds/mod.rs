@@ -6,17 +6,20 @@
 //! Everything in it is the configuration's or a constant of the adapter, so the sheet and the device cannot differ. The
 //! same configuration makes the same bytes: the File object serves them, and `axisbridge eds` writes them.
 //!
-//! Left out is what the box does not have or the configuration does not know: icons, assemblies, the parameters of the
+//! A device with assemblies has them in its sheet, and its connections to them in place of the motion connection.
+//!
+//! Left out is what the box does not have or the configuration does not know: icons, the parameters of the
 //! axes (a CIP Motion controller has those from its own profile), speed and label of the port.
 
+mod assembly;
 mod writer;
 
 use profile_cip::device::adapter::SESSIONS_MAX;
 use profile_cip::device::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_CONVERTER, DEVICE_TYPE_CIP_MOTION_DRIVE,
-    DEVICE_TYPE_CIP_MOTION_ENCODER,
+    DEVICE_TYPE_CIP_MOTION_ENCODER, DEVICE_TYPE_GENERIC,
 };
-use profile_cip::device::connection_manager::{CONNECTIONS_MAX, EXPLICIT_CONNECTIONS_MAX};
+use profile_cip::device::connection_manager::{CONNECTIONS_MAX, EXPLICIT_CONNECTIONS_MAX, LISTENERS_MAX};
 use profile_cip::device::motion_open;
 use profile_cip::device::object_list::{OBJECT_CLASSES, ObjectClass};
 use profile_cip::device::objects::class::CLASS_CONNECTION_MANAGER;
@@ -77,6 +80,7 @@ pub fn sheet(device: &Device, adapter: &AdapterConfig) -> String {
     w.section("Device Classification");
     w.entry("Class1", &[Field::Word("EtherNetIP")]);
     parameters(&mut w, adapter);
+    assembly::section(&mut w, adapter);
     for class in &OBJECT_CLASSES {
         // The sheet has no section for the axes.
         if class.instance.is_some() {
@@ -116,6 +120,7 @@ fn device_type(code: u16) -> &'static str {
         DEVICE_TYPE_CIP_MOTION_DRIVE => "CIP Motion Drive",
         DEVICE_TYPE_CIP_MOTION_ENCODER => "CIP Motion Encoder",
         DEVICE_TYPE_CIP_MOTION_CONVERTER => "CIP Motion Converter",
+        DEVICE_TYPE_GENERIC => "Generic Device",
         _ => "Vendor Specific",
     }
 }
@@ -131,7 +136,11 @@ fn parameters(w: &mut Writer, adapter: &AdapterConfig) {
     w.section("Params");
     let rpi =
         [motion.rpi_min_us, motion.acceptable_rpi_us(u32::MAX), motion.acceptable_rpi_us(RPI_PROPOSED_US)];
-    param(w, PARAM_RPI, UDINT, ("Controller Update Period", "us"), rpi);
+    let interval = if adapter.assembly.is_some() { "Packet interval" } else { "Controller Update Period" };
+    param(w, PARAM_RPI, UDINT, (interval, "us"), rpi);
+    if adapter.assembly.is_some() {
+        return;
+    }
     let size = |most: u16| {
         let (least, most) = motion.sizes(most);
         [data_size(least), data_size(most), data_size(most)]
@@ -172,7 +181,10 @@ fn object(w: &mut Writer, class: &ObjectClass, adapter: &AdapterConfig) {
     w.entry("Object_Name", &[Field::Text(class.name)]);
     w.entry("Object_Class_Code", &[Field::Hex(u32::from(class.class), 2)]);
     if class.class == CLASS_CONNECTION_MANAGER {
-        connection(w, adapter);
+        match &adapter.assembly {
+            None => connection(w, adapter),
+            Some(assemblies) => assembly::connections(w, assemblies),
+        }
     }
 }
 
@@ -232,13 +244,18 @@ fn capacity(w: &mut Writer, adapter: &AdapterConfig) {
     let count = |most: usize| Field::Number(u32::try_from(most).unwrap_or(u32::MAX));
     w.section("Capacity");
     w.comment(&format!("{SESSIONS_MAX} encapsulation sessions"));
-    w.entry("MaxCIPConnections", &[Field::from(CONNECTIONS_MAX)]);
-    w.entry("MaxIOConnections", &[Field::Number(u32::from(CONNECTIONS_MAX).saturating_sub(explicit()))]);
+    let listeners = u32::try_from(LISTENERS_MAX).unwrap_or(0);
+    let all = u32::from(CONNECTIONS_MAX) + if adapter.assembly.is_some() { listeners } else { 0 };
+    w.entry("MaxCIPConnections", &[Field::Number(all)]);
+    w.entry("MaxIOConnections", &[Field::Number(all.saturating_sub(explicit()))]);
     w.entry("MaxMsgConnections", &[count(EXPLICIT_CONNECTIONS_MAX)]);
     let per_second = Field::Number(1_000_000 / motion.rpi_min_us.max(1));
-    let size = |most: u16| Field::from(motion.sizes(most).1);
-    w.entry("TSpec1", &[Field::Word("Rx"), size(motion.o_to_t_size_max), per_second.clone()]);
-    w.entry("TSpec2", &[Field::Word("Tx"), size(motion.t_to_o_size_max), per_second]);
+    let (rx, tx) = match &adapter.assembly {
+        None => (motion.sizes(motion.o_to_t_size_max).1, motion.sizes(motion.t_to_o_size_max).1),
+        Some(assemblies) => (assemblies.o_to_t_size(), assemblies.t_to_o_size()),
+    };
+    w.entry("TSpec1", &[Field::Word("Rx"), Field::from(rx), per_second.clone()]);
+    w.entry("TSpec2", &[Field::Word("Tx"), Field::from(tx), per_second]);
 }
 
 fn explicit() -> u32 {

@@ -34,6 +34,15 @@ pub enum Refused {
     },
     /// It is no class 1 datagram, or too long for one.
     Malformed,
+    /// It is not behind the last one of its connection.
+    Old,
+    /// Its data have a wrong length.
+    Size {
+        /// Bytes of the data with their header.
+        expected: usize,
+        /// Bytes that it carries.
+        found: usize,
+    },
     /// It is of another connection.
     ConnectionId {
         /// ID of the open connection.
@@ -52,6 +61,8 @@ impl fmt::Display for Refused {
                 write!(f, "the updates of the motion connection come from port {expected}")
             }
             Self::Malformed => f.write_str("expected a class 1 datagram"),
+            Self::Old => f.write_str("expected a later encapsulation sequence number"),
+            Self::Size { expected, found } => write!(f, "expected {expected} bytes of data, found {found}"),
             Self::ConnectionId { expected, found } => {
                 write!(f, "expected connection ID {expected:#010X}, found {found:#010X}")
             }

@@ -18,6 +18,7 @@
 
 pub mod access;
 pub mod admission;
+pub mod assembly;
 pub mod axis;
 pub mod build;
 pub mod bus;
@@ -43,6 +44,7 @@ use profile_cip::device::motion_device::{SyncQuality, SyncState};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::{TimeBase, TimeSample};
 
+use self::assembly::AssemblyChannel;
 use self::axis::rest::Unrested;
 use self::axis::{AxisChannel, Owner};
 use self::bus::sercos::SercosBus;
@@ -74,6 +76,7 @@ pub struct Engine {
     mapping: Mapping,
     buses: Buses,
     devices: Vec<DeviceChannel>,
+    assemblies: Vec<AssemblyChannel>,
     /// Local control, if the gateway offers it.
     local: Option<LocalNorth>,
     /// Registers that are parameters of drives, if there are some.
@@ -97,8 +100,10 @@ pub struct Parts {
     pub mapping: Mapping,
     /// The buses, and which of them each axis is on.
     pub buses: Buses,
-    /// The motion devices.
+    /// The motion devices. Their numbers and those of the devices with assemblies are the places of their ports.
     pub devices: Vec<DeviceChannel>,
+    /// The devices with assemblies.
+    pub assemblies: Vec<AssemblyChannel>,
     /// All axes.
     pub axes: Vec<AxisChannel>,
     /// What people should know goes there; when it is full, notices are dropped.
@@ -113,10 +118,10 @@ impl Engine {
     /// An engine of these parts.
     #[must_use]
     pub fn new(parts: Parts) -> Self {
-        let Parts { mapping, buses, devices, axes, notices, publisher, lead } = parts;
+        let Parts { mapping, buses, devices, assemblies, axes, notices, publisher, lead } = parts;
         let cycle_time = buses.iter().map(South::cycle_time).min().unwrap_or(IDLE_INTERVAL);
         Self {
-            publication: Publication::new(publisher, cycle_time, axes.len(), &devices),
+            publication: Publication::new(publisher, cycle_time, axes.len(), (&devices, &assemblies)),
             schedule: Schedule::new(cycle_time, lead),
             locks: [PhaseLock::default(); BUSES_MAX],
             clock: Clock::default(),
@@ -125,6 +130,7 @@ impl Engine {
             mapping,
             buses,
             devices,
+            assemblies,
             local: None,
             registers: None,
             direct: None,
@@ -184,6 +190,12 @@ impl Engine {
         &self.devices
     }
 
+    /// The devices with assemblies, in the order of the configuration.
+    #[must_use]
+    pub fn assemblies(&self) -> &[AssemblyChannel] {
+        &self.assemblies
+    }
+
     /// The buses in the order of the configuration.
     #[must_use]
     pub fn buses(&self) -> &Buses {
@@ -206,6 +218,7 @@ impl Engine {
     pub fn set_sync(&mut self, sync: SyncState) {
         let sync = self.clock.set_sync(sync);
         self.devices.iter_mut().for_each(|channel| channel.device_mut().set_sync(sync));
+        self.assemblies.iter_mut().for_each(|channel| channel.set_synchronized(sync.synchronized));
     }
 
     /// How good the synchronization of system time is.
@@ -288,17 +301,24 @@ impl Engine {
         }
         self.follow_time();
         let next_call = self.end_call(now);
-        for (channel, port) in self.devices.iter_mut().zip(north.iter_mut()) {
-            channel.transmit((now, next_call), &self.clock.base, &mut **port);
+        for channel in &mut self.devices {
+            if let Some(port) = north.get_mut(usize::from(channel.number())) {
+                channel.transmit((now, next_call), &self.clock.base, &mut **port);
+            }
+        }
+        for channel in &mut self.assemblies {
+            if let Some(port) = north.get_mut(usize::from(channel.number())) {
+                channel.transmit(now, &mut **port);
+            }
         }
         if self.ending.advance(now, self.clock.base.system_at(now), &mut self.axes) {
             self.buses.iter_mut().for_each(|bus| bus.stop(now));
         }
         let notices = &mut self.notices;
         let changed = self.changes.report(now, &self.axes, &mut |notice| push(notices, notice));
-        let Self { buses, devices, axes, changes, ending, publication, .. } = self;
-        let sources =
-            Sources { stopping: ending.has_begun, buses, devices, axes, changes, locks: &self.locks };
+        let Self { buses, devices, assemblies, axes, changes, ending, publication, .. } = self;
+        let stopping = ending.has_begun;
+        let sources = Sources { stopping, buses, devices, assemblies, axes, changes, locks: &self.locks };
         publication.publish(now, changed, &sources);
         next_call
     }
@@ -342,13 +362,33 @@ impl Engine {
 
     /// Takes what came from controllers, and lets controllers and axes exchange their values.
     fn serve_norths(&mut self, now: MonotonicTime, north: &mut [&mut dyn NorthPort]) {
-        let Self { devices, local, registers, direct, mapping, axes, buses, notices, clock, ending, .. } =
-            self;
+        let Self {
+            devices,
+            assemblies,
+            local,
+            registers,
+            direct,
+            mapping,
+            axes,
+            buses,
+            notices,
+            clock,
+            ending,
+            ..
+        } = self;
         let time = &clock.base;
-        for (channel, port) in devices.iter_mut().zip(north.iter_mut()) {
-            channel.receive(now, time, &mut **port);
+        for channel in devices.iter_mut() {
+            if let Some(port) = north.get_mut(usize::from(channel.number())) {
+                channel.receive(now, time, &mut **port);
+            }
+        }
+        for channel in assemblies.iter_mut() {
+            if let Some(port) = north.get_mut(usize::from(channel.number())) {
+                channel.receive(now, &mut **port);
+            }
         }
         devices.iter().for_each(|channel| channel.publish_connection(axes));
+        assemblies.iter().for_each(|channel| channel.publish_connection(axes));
         let notice = &mut |notice| push(notices, notice);
         let mut exchange = Exchange { now, time, mapping, ending: ending.has_begun, axes, notice };
         if let Some(local) = local {
@@ -366,6 +406,9 @@ impl Engine {
         for channel in devices {
             channel.exchange(&mut exchange);
             channel.attributes(now, mapping, exchange.axes, buses, exchange.notice);
+        }
+        for channel in assemblies {
+            channel.exchange(&mut exchange);
         }
     }
 
@@ -421,15 +464,17 @@ impl Engine {
         let patience = self.buses.iter().map(South::patience).min().unwrap_or(IDLE_INTERVAL);
         let due = self.schedule.end(now, wake, patience);
         // A controller that is faster than the buses gets its updates in between.
-        let period = self.devices.iter().filter_map(DeviceChannel::update_period).min();
+        let period = self.devices.iter().filter_map(DeviceChannel::update_period);
+        let period = period.chain(self.assemblies.iter().filter_map(AssemblyChannel::update_period)).min();
         let fast = period.filter(|period| *period < self.schedule.cycle_time);
         fast.map_or(due, |period| due.min(now + DurationNs(period.as_nanos() / 2)))
     }
 
     fn run_buses(&mut self, now: MonotonicTime) {
         let system = self.clock.base.system_at(now);
-        let Self { mapping, buses, devices, local, registers, axes, notices, .. } = self;
+        let Self { mapping, buses, devices, assemblies, local, registers, axes, notices, .. } = self;
         let idle = devices.iter().all(|channel| channel.device().connection().is_none())
+            && assemblies.iter().all(|channel| channel.owner().is_none())
             && axes.iter().all(|axis| axis.owner() != Owner::Local);
         // Both closures push notices, never at the same time.
         let notices = RefCell::new(notices);
@@ -462,10 +507,13 @@ fn hand_on(
     answer: Answer,
     notice: &mut dyn FnMut(Notice),
 ) {
-    let data = answer.result.as_ref().map(|(data, _)| data.as_slice()).map_err(|failure| *failure);
+    let data = answer.data().map(|data| data.as_slice());
     let axis = &mut axes[answer.axis];
     match answer.purpose {
-        Purpose::Attribute { .. } | Purpose::Original { .. } | Purpose::Setting(_) => {
+        Purpose::Attribute { .. }
+        | Purpose::Original { .. }
+        | Purpose::Setting(_)
+        | Purpose::Nameplate(_) => {
             norths.devices.iter_mut().any(|channel| channel.answer(&answer, mapping, axes, notice));
         }
         Purpose::LocalParameter(ticket) => {
@@ -486,6 +534,7 @@ fn hand_on(
                 notice(Notice::DriveSays { axis: u8::try_from(answer.axis).unwrap_or(u8::MAX), said });
             }
         }
+        Purpose::SlowValue => axis.slow_value_read(now, answer.item, data.ok()),
         Purpose::Capture(access, generation) => axis.capture_answer(access, generation, data),
         Purpose::Procedure(access, generation) => {
             let progress = answer.result.map(|(_, progress)| progress);

@@ -1,6 +1,7 @@
 //! The contract of a north side: what controls axes in the generic model.
 //!
-//! There are two: a CIP Motion device ([`super::device`]) and local control ([`super::local`]). An axis belongs to one of
+//! There are three: a CIP Motion device ([`super::device`]), a device with assemblies ([`super::assembly`]) and local control
+//! ([`super::local`]). An axis belongs to one of
 //! them at a time, see [`super::axis::Owner`]. The counterpart for drives is [`super::bus::South`].
 
 use profile_generic::time::{MonotonicTime, SystemTime};

@@ -368,6 +368,17 @@ pub enum Notice {
         /// It is what the configuration has.
         configured: bool,
     },
+    /// The nameplate in the configuration says something else than the drive, which counts.
+    OtherNameplate {
+        /// Number of the axis.
+        axis: u8,
+        /// The attribute.
+        attribute: u16,
+        /// What the configuration has.
+        configured: Option<Number>,
+        /// What the drive has.
+        held: Option<Number>,
+    },
     /// The drive did not take back what it had before the last controller: it keeps what that has set.
     NotReturned {
         /// Number of the axis.
@@ -483,8 +494,76 @@ impl Notice {
             | Self::DriveSays { axis, .. }
             | Self::Logged { axis, .. }
             | Self::NotEqual { axis, .. }
+            | Self::OtherNameplate { axis, .. }
             | Self::NotReturned { axis, .. }
             | Self::Scaling { axis, .. } => Some(*axis),
+        }
+    }
+}
+
+impl Notice {
+    /// What kind of thing has happened, for those who look for something.
+    #[must_use]
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::Sercos(_)
+            | Self::Can { .. }
+            | Self::Lss { .. }
+            | Self::Devicenet { .. }
+            | Self::Retry
+            | Self::Progress { .. }
+            | Self::PhaseLock { .. } => "bus",
+            Self::TimeStep { .. } => "time",
+            Self::DriveMissing { .. }
+            | Self::Commissioning { .. }
+            | Self::Startup { .. }
+            | Self::StartupFailed { .. }
+            | Self::PassedOver { .. }
+            | Self::SlaveSetup { .. }
+            | Self::SlaveAnswers { .. }
+            | Self::NodeCommissioning { .. }
+            | Self::NodeProgram { .. }
+            | Self::ModesTried { .. }
+            | Self::NotMapped { .. }
+            | Self::Period { .. }
+            | Self::ModesLeftOut { .. }
+            | Self::Bare { .. }
+            | Self::NodeModesLeftOut { .. }
+            | Self::Family { .. }
+            | Self::ObjectsPassedOver { .. }
+            | Self::Program { .. }
+            | Self::Difference { .. }
+            | Self::OtherNameplate { .. }
+            | Self::Ends { .. } => "commissioning",
+            Self::State { .. } | Self::AxisState { .. } | Self::LocalControl { .. } => "state",
+            Self::Waiting { .. } => "wait",
+            Self::Fault { .. } | Self::DriveSays { .. } | Self::Logged { .. } | Self::Node { .. } => "fault",
+            Self::Refused { .. }
+            | Self::Strangers { .. }
+            | Self::NotEqual { .. }
+            | Self::NotReturned { .. }
+            | Self::Scaling { .. } => "refusal",
+        }
+    }
+
+    /// The bus that it is about, where it is about no axis.
+    #[must_use]
+    pub const fn bus(&self) -> Option<BusName> {
+        match self {
+            Self::Sercos(_) | Self::Retry | Self::Progress { .. } => Some(BusName::Sercos),
+            Self::Can { bus, .. } | Self::Lss { bus, .. } => Some(BusName::Can(bus.saturating_add(1))),
+            Self::Devicenet { network, .. } => Some(BusName::Devicenet(network.saturating_add(1))),
+            Self::PhaseLock { bus, .. } => Some(*bus),
+            _ => None,
+        }
+    }
+
+    /// The device that it is about, where it is about no axis.
+    #[must_use]
+    pub const fn device(&self) -> Option<u8> {
+        match self {
+            Self::Node { device, .. } | Self::Strangers { device, .. } => Some(*device),
+            _ => None,
         }
     }
 }
@@ -615,6 +694,12 @@ impl fmt::Display for Notice {
             Self::NotEqual { attribute, .. } => {
                 write!(f, "attribute {attribute} is not what the drive has, and only the drive can change that")
             }
+            Self::OtherNameplate { attribute, configured: Some(configured), held: Some(held), .. } => {
+                write!(f, "attribute {attribute}: the nameplate in the configuration has {configured}, the drive {held}, which counts")
+            }
+            Self::OtherNameplate { attribute, .. } => {
+                write!(f, "attribute {attribute}: the nameplate in the configuration is not what the drive has, which counts")
+            }
             Self::NotReturned { item, failure, .. } => {
                 let why = match failure {
                     AccessFailure::Refused(_) => "the drive refuses it",
@@ -696,6 +781,17 @@ mod tests {
     use profile_sercos::wire::idn::Idn;
     use profile_sercos::wire::svc::Element;
     use profile_sercos::wire::svc_error::SvcError;
+
+    #[test]
+    fn notice_names_its_kind_and_what_it_is_about() {
+        let event = DevicenetEvent::Online;
+        let notice = Notice::Devicenet { network: 1, event };
+        assert_eq!((notice.kind(), notice.bus(), notice.axis()), ("bus", Some(BusName::Devicenet(2)), None));
+        let notice = Notice::Node { device: 3, fault: NodeFault::NONE, alarm: NodeAlarm::NONE };
+        assert_eq!((notice.kind(), notice.bus(), notice.device()), ("fault", None, Some(3)));
+        let notice = Notice::Ends { axis: 2 };
+        assert_eq!((notice.kind(), notice.bus(), notice.device()), ("commissioning", None, None));
+    }
 
     #[test]
     fn what_a_drive_lacks_stands_in_one_line() {

@@ -121,9 +121,9 @@ impl ParameterJob {
         let computation = mapping.dictionaries.generic.computation(self.parameter);
         let datum = axis.south().and_then(|program| program.datum(self.parameter));
         let request = match (computation.filter(|_| is_computed), datum, self.wanted) {
+            (_, Some(value), None) => Err(Ok(value)),
+            (_, Some(_), Some(_)) => Err(Err(ParameterFailure::ReadOnly)),
             (Some(computation), ..) => self.compute(computation, axis),
-            (None, Some(value), None) => Err(Ok(value)),
-            (None, Some(_), Some(_)) => Err(Err(ParameterFailure::ReadOnly)),
             (None, None, Some(wanted)) => self.write(self.parameter, wanted, axis),
             (None, None, None) => self.read(self.parameter, Asked::Value, axis),
         };

@@ -22,7 +22,7 @@ pub struct Datagram {
     pub arrived_at: Option<MonotonicTime>,
 }
 
-/// The class 1 UDP port of one CIP Motion device.
+/// The class 1 UDP port of one device.
 pub trait NorthPort {
     /// Receives the next datagram; `None` if none waits. A datagram that is longer than the buffer has length 0, so that it
     /// counts towards a limit on the datagrams of a cycle.

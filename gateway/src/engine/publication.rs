@@ -1,10 +1,14 @@
 //! The published status of the box: made at each change, and every 10 ms otherwise.
 
+use profile_cip::device::identity::ModuleState;
 use profile_cip::device::visualization::display::{self, Line};
 use profile_cip::device::visualization::{self, Indication};
+use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::inhibit::Inhibits;
+use profile_generic::state::DriveState;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
+use super::assembly::AssemblyChannel;
 use super::axis::{Awaited, AxisChannel};
 use super::bus::{Buses, South};
 use super::changes::Changes;
@@ -33,6 +37,7 @@ pub(super) struct Sources<'a> {
     pub stopping: bool,
     pub buses: &'a Buses,
     pub devices: &'a [DeviceChannel],
+    pub assemblies: &'a [AssemblyChannel],
     pub axes: &'a [AxisChannel],
     pub changes: &'a Changes,
     pub locks: &'a [PhaseLock],
@@ -51,10 +56,11 @@ struct Outline {
 impl Outline {
     fn of(sources: &Sources<'_>) -> Self {
         let connected = sources.devices.iter().filter(|channel| channel.device().connection().is_some());
+        let owned = sources.assemblies.iter().filter(|channel| channel.owner().is_some());
         Self {
             stopping: sources.stopping,
             up: sources.buses.iter().all(South::is_up),
-            connections: u8::try_from(connected.count()).unwrap_or(u8::MAX),
+            connections: u8::try_from(connected.count() + owned.count()).unwrap_or(u8::MAX),
         }
     }
 
@@ -74,7 +80,7 @@ impl Publication {
         publisher: Publisher<BoxStatus>,
         cycle_time: DurationNs,
         axes: usize,
-        devices: &[DeviceChannel],
+        (devices, assemblies): (&[DeviceChannel], &[AssemblyChannel]),
     ) -> Self {
         let mut status = BoxStatus::STARTING;
         status.cycle_time_ns = u32::try_from(cycle_time.as_nanos()).unwrap_or(u32::MAX);
@@ -84,6 +90,14 @@ impl Publication {
             for (place, (axis, _)) in channel.axis_states().enumerate() {
                 if let Some(entry) = status.axes.get_mut(axis) {
                     entry.indicators.several = several;
+                    entry.instance = u8::try_from(place + 1).unwrap_or(u8::MAX);
+                    entry.device = channel.number();
+                }
+            }
+        }
+        for channel in assemblies {
+            for (place, axis) in channel.members().enumerate() {
+                if let Some(entry) = status.axes.get_mut(axis) {
                     entry.instance = u8::try_from(place + 1).unwrap_or(u8::MAX);
                     entry.device = channel.number();
                 }
@@ -171,6 +185,60 @@ impl Publication {
                 }
             }
         }
+        for channel in sources.assemblies {
+            fill_assembly(&mut self.status, channel, now, sources);
+        }
+    }
+}
+
+/// The axes of a device with assemblies. They have no states of CIP Motion: what is shown are those that come nearest.
+fn fill_assembly(
+    status: &mut BoxStatus,
+    channel: &AssemblyChannel,
+    now: MonotonicTime,
+    sources: &Sources<'_>,
+) {
+    let counts = channel.counts();
+    status.counters.lost_updates += counts.lost_updates;
+    status.counters.refused_frames += counts.refused;
+    let controller =
+        channel.owner().map(|(address, update_period_us)| Controller { address, update_period_us });
+    let network = channel.network_status();
+    let axes = || channel.members().filter_map(|number| sources.axes.get(number));
+    let module = if axes().any(|axis| axis.fault().is_some()) {
+        ModuleState::MajorRecoverableFault
+    } else if axes().any(|axis| axis.may_have_torque()) {
+        ModuleState::Operational
+    } else {
+        ModuleState::Standby
+    };
+    for (number, scale) in channel.members().zip(channel.scales()) {
+        if let (Some(entry), Some(axis)) = (status.axes.get_mut(number), sources.axes.get(number)) {
+            of_axis(entry, axis);
+            entry.indicators = Indicators { module, network, ..Indicators::NONE };
+            entry.controller = controller;
+            entry.lost_updates = u32::try_from(counts.lost_updates).unwrap_or(u32::MAX);
+            entry.position_counts = scale.counts(axis.feedback().position.get()).map_or(0, low_word);
+            entry.wait = sources.changes.wait(now, number, axis);
+            entry.cip_axis_state = state_code(axis.state()).0;
+        }
+    }
+}
+
+/// The state of CIP Motion that comes nearest to one of the generic model.
+fn state_code(state: DriveState) -> AxisStateCode {
+    match state {
+        DriveState::NotReady => AxisStateCode::INITIALIZING,
+        DriveState::Inhibited => AxisStateCode::START_INHIBITED,
+        DriveState::AwaitingPower => AxisStateCode::PRE_CHARGE,
+        DriveState::Ready => AxisStateCode::STOPPED,
+        DriveState::Starting => AxisStateCode::STARTING,
+        DriveState::Operating => AxisStateCode::RUNNING,
+        DriveState::Testing => AxisStateCode::TESTING,
+        DriveState::Stopping => AxisStateCode::STOPPING,
+        DriveState::FaultReaction => AxisStateCode::ABORTING,
+        DriveState::Faulted => AxisStateCode::MAJOR_FAULTED,
+        DriveState::Shutdown => AxisStateCode::SHUTDOWN,
     }
 }
 
@@ -222,11 +290,18 @@ mod tests {
     #[test]
     fn status_is_published_at_a_change_and_every_ten_milliseconds() {
         let (publisher, reader) = latest(BoxStatus::STARTING);
-        let mut publication = Publication::new(publisher, DurationNs::from_millis(2), 0, &[]);
+        let mut publication = Publication::new(publisher, DurationNs::from_millis(2), 0, (&[], &[]));
         let (buses, changes) = (Buses::default(), Changes::new(&[]));
         let mut publish = |millis, changed, stopping| {
-            let sources =
-                Sources { stopping, buses: &buses, devices: &[], axes: &[], changes: &changes, locks: &[] };
+            let sources = Sources {
+                stopping,
+                buses: &buses,
+                devices: &[],
+                assemblies: &[],
+                axes: &[],
+                changes: &changes,
+                locks: &[],
+            };
             publication.publish(at(millis), changed, &sources);
             let status = reader.read();
             (status.uptime, status.state)
@@ -243,7 +318,7 @@ mod tests {
     fn call_late_by_more_than_half_a_cycle_is_counted() {
         let (publisher, _) = latest(BoxStatus::STARTING);
         let cycle = DurationNs::from_millis(2);
-        let mut publication = Publication::new(publisher, cycle, 0, &[]);
+        let mut publication = Publication::new(publisher, cycle, 0, (&[], &[]));
         for micros in [0, 1_000, 1_001, 20] {
             publication.count_lateness(DurationNs::from_micros(micros), cycle);
         }

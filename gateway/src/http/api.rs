@@ -3,7 +3,9 @@
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
-use super::view::Look;
+use super::view::{FaultList, HTTP_FAULTS_MAX, HTTP_LINES_MAX, LogLines, Look};
+use crate::config::LogLevel;
+use crate::history::LogQuery;
 use crate::local::overview::Overview;
 
 /// Where OpenAPI keeps the schemas.
@@ -17,6 +19,8 @@ pub fn openapi() -> Value {
     let mut generator = settings.into_generator();
     let overview = generator.subschema_for::<Overview>();
     let look = generator.subschema_for::<Look>();
+    let faults = generator.subschema_for::<FaultList>();
+    let lines = generator.subschema_for::<LogLines>();
     let schemas = generator.take_definitions(false);
     let json = |schema: &schemars::Schema| json!({ "application/json": { "schema": schema } });
     let text = |kind: &str| json!({ kind: { "schema": { "type": "string" } } });
@@ -34,6 +38,36 @@ pub fn openapi() -> Value {
     );
     events["get"]["responses"]["200"]["x-event-data"] = json!({ "status": look });
     events["get"]["responses"]["503"] = good("Too many viewers", text("text/plain"));
+    let parameter = |name: &str, description: &str, schema: Value| json!({ "name": name, "in": "query", "description": description, "schema": schema });
+    let of_axis = |what: &str| parameter("axis", what, json!({ "type": "string" }));
+    let wrong = good("The query is wrong; why", text("text/plain"));
+    let mut fault_list = path(
+        "Faults that are present, and faults that were, as `axisbridge faults` shows them",
+        json!({ "200": good(&format!("Newest first, at most {HTTP_FAULTS_MAX}"), json(&faults)), "400": wrong }),
+    );
+    fault_list["get"]["parameters"] = json!([of_axis("Only faults of this axis")]);
+    let mut log = path(
+        "Lines of the log, as `axisbridge log --json` shows them",
+        json!({ "200": good("Oldest first", json(&lines)), "400": wrong }),
+    );
+    log["get"]["parameters"] = json!([
+        parameter(
+            "after",
+            "Only lines after this number; without it the newest lines",
+            json!({ "type": "integer", "minimum": 0 })
+        ),
+        parameter(
+            "lines",
+            "At most so many",
+            json!({ "type": "integer", "minimum": 1, "maximum": HTTP_LINES_MAX, "default": LogQuery::default().lines })
+        ),
+        parameter(
+            "level",
+            "Only lines that matter at least as much",
+            json!({ "enum": LogLevel::ALL.map(LogLevel::name) })
+        ),
+        of_axis("Only lines about this axis"),
+    ]);
     let status = "The same object as that of `axisbridge status --json`";
     json!({
         "openapi": "3.1.0",
@@ -56,6 +90,8 @@ pub fn openapi() -> Value {
             ),
             "/metrics": file("Metrics in the text format of OpenMetrics 1.0", "application/openmetrics-text"),
             "/api/v1/status": path(status, json!({ "200": good(status, json(&overview)) })),
+            "/api/v1/faults": fault_list,
+            "/api/v1/log": log,
             "/api/v1/openapi.json": path(
                 "This description",
                 json!({ "200": good("OpenAPI 3.1", json!({ "application/json": { "schema": { "type": "object" } } })) }),
@@ -76,6 +112,10 @@ mod tests {
         let status = serde_json::to_value(view.look()).unwrap();
         let look = &description["components"]["schemas"]["Look"];
         compare(&description, look, &status, "Look");
+        let faults = serde_json::to_value(view.faults(None)).unwrap();
+        compare(&description, &description["components"]["schemas"]["FaultList"], &faults, "FaultList");
+        let lines = serde_json::to_value(view.log(&LogQuery::default())).unwrap();
+        compare(&description, &description["components"]["schemas"]["LogLines"], &lines, "LogLines");
         let reference = &description["paths"]["/api/v1/status"]["get"]["responses"]["200"]["content"]["application/json"]
             ["schema"]["$ref"];
         assert_eq!(reference, "#/components/schemas/Overview");

@@ -1,22 +1,15 @@
 //! Whether the gateway is alive, and whether it is ready.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::DriveState;
-use profile_generic::time::DurationNs;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::local::overview::{Axis, Bus, Overview};
+use crate::status::pulse::silence;
 use crate::status::{BoxState, BoxStatus};
-
-/// Least age of the published status that means that the cycle thread has stopped. It publishes every 10 ms, or every cycle of
-/// its fastest bus.
-const SILENCE: Duration = Duration::from_secs(1);
-
-/// Cycles without publication that mean the same, for slow buses.
-const SILENT_CYCLES: u32 = 4;
 
 /// The health of a gateway.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -34,23 +27,13 @@ pub struct Health {
 impl Health {
     /// Judges a status that has not changed for `age`.
     pub(super) fn of(status: &BoxStatus, age: Duration, overview: &Overview) -> Self {
-        let reason = reason(status, age);
+        let reason = silence(status, age);
         let mut missing: Vec<String> = reason.clone().into_iter().collect();
         missing.extend(stage(status.state));
         missing.extend(overview.buses.iter().filter_map(missing_at_bus));
         missing.extend(overview.axes.iter().filter_map(missing_at_axis));
         Self { alive: reason.is_none(), reason, ready: missing.is_empty(), missing }
     }
-}
-
-/// Why the cycle thread is not alive.
-fn reason(status: &BoxStatus, age: Duration) -> Option<String> {
-    if status.state == BoxState::STARTING {
-        return Some("the cycle thread has not started yet".to_owned());
-    }
-    let slow = Duration::from_nanos(u64::from(status.cycle_time_ns)) * SILENT_CYCLES;
-    let late = age > SILENCE.max(slow);
-    late.then(|| format!("the cycle thread has published nothing for {} s", age.as_secs()))
 }
 
 /// What the state of the whole gateway lacks that no bus lacks.
@@ -72,27 +55,6 @@ fn missing_at_axis(axis: &Axis) -> Option<String> {
     let waits = no_drive.is_some_and(|(_, name)| axis.inhibits.iter().any(|inhibit| inhibit == name));
     let initialises = axis.state == DriveState::NotReady.name();
     (waits || initialises).then(|| format!("axis {name}: its drive {} is not commissioned", axis.drive))
-}
-
-/// Since when the published status is the same.
-#[derive(Debug)]
-pub(super) struct Heartbeat {
-    uptime: DurationNs,
-    since: Instant,
-}
-
-impl Heartbeat {
-    pub fn new(now: Instant) -> Self {
-        Self { uptime: DurationNs::ZERO, since: now }
-    }
-
-    /// Takes the uptime of a status, which each publication changes, and returns for how long it has been the same.
-    pub fn age(&mut self, now: Instant, uptime: DurationNs) -> Duration {
-        if self.uptime != uptime {
-            *self = Self { uptime, since: now };
-        }
-        now.saturating_duration_since(self.since)
-    }
 }
 
 #[cfg(test)]
@@ -151,15 +113,5 @@ mod tests {
         assert!(health(&slow, 4_000).alive && !health(&slow, 4_001).alive);
         let starting = health(&BoxStatus::STARTING, 0);
         assert_eq!(starting.reason.as_deref(), Some("the cycle thread has not started yet"));
-    }
-
-    #[test]
-    fn age_counts_from_the_last_change_of_uptime() {
-        let start = Instant::now();
-        let mut heartbeat = Heartbeat::new(start);
-        let mut age = |millis, uptime| {
-            heartbeat.age(start + Duration::from_millis(millis), DurationNs(uptime)).as_millis()
-        };
-        assert_eq!([age(5, 0), age(7, 1), age(9, 1), age(30, 1), age(31, 2)], [5, 0, 2, 23, 0]);
     }
 }

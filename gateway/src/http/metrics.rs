@@ -162,7 +162,7 @@ fn seconds_of_unsigned(nanos: u64) -> f64 {
 
 impl Scrape {
     fn process(&self, families: &mut Families<'_>) -> fmt::Result {
-        let Look { health, status } = &self.look;
+        let Look { health, status, .. } = &self.look;
         let labels = [("name", status.name.as_str()), ("version", status.version.as_str())];
         families.gauges("axisbridge_build_info", None, "Name and version of the gateway", [(labels, 1.0)])?;
         let start = Some(Unit::Seconds);

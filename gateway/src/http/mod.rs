@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! cycle thread --status--> View --Look--> /healthz /readyz /metrics /api/v1/status
+//!    histories ------------/   \--------> /api/v1/faults /api/v1/log
 //!                            \--twice a second--> /events --> page in a browser
 //! ```
 //!
@@ -24,4 +25,4 @@ pub use api::openapi;
 pub use health::Health;
 pub use metrics::metrics;
 pub use server::{HttpServer, RunningServer};
-pub use view::{Look, View};
+pub use view::{FaultList, LogLines, Look, Newest, View};

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::Router;
-use axum::extract::State;
+use axum::extract::{RawQuery, State};
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
     RETRY_AFTER, X_CONTENT_TYPE_OPTIONS,
@@ -18,7 +18,8 @@ use super::events::Events;
 use super::metrics::metrics;
 use super::page;
 use super::server::Load;
-use super::view::View;
+use super::view::{HTTP_LINES_MAX, View};
+use crate::local::protocol::{BadRequest, fault_query, log_query};
 
 const TEXT: &str = "text/plain; charset=utf-8";
 const JSON: &str = "application/json";
@@ -58,6 +59,8 @@ pub fn routes(sources: Sources) -> Router {
         .route("/readyz", get(readyz))
         .route("/metrics", get(scrape))
         .route("/api/v1/status", get(status))
+        .route("/api/v1/faults", get(faults))
+        .route("/api/v1/log", get(log))
         .route("/api/v1/openapi.json", get(async || typed(JSON, openapi().to_string())))
         .fallback(async || (StatusCode::NOT_FOUND, typed(TEXT, "there is nothing at this path\n")))
         .layer(map_response(with_headers))
@@ -99,6 +102,31 @@ async fn scrape(State(sources): State<Sources>) -> Response {
 async fn status(State(sources): State<Sources>) -> Response {
     // The object has texts, numbers and lists, and nothing that JSON does not know.
     typed(JSON, serde_json::to_string(&sources.view.look().status).unwrap_or_default())
+}
+
+async fn faults(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Response {
+    match fault_query(&words(query.as_deref()), &sources.view.axes()) {
+        Ok(axis) => {
+            typed(JSON, serde_json::to_string(&sources.view.faults(axis.as_deref())).unwrap_or_default())
+        }
+        Err(error) => refused(&error),
+    }
+}
+
+async fn log(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Response {
+    match log_query(&mut words(query.as_deref()).into_iter(), &sources.view.axes(), HTTP_LINES_MAX) {
+        Ok(query) => typed(JSON, serde_json::to_string(&sources.view.log(&query)).unwrap_or_default()),
+        Err(error) => refused(&error),
+    }
+}
+
+/// The parts of a query: names of axes and numbers need no escapes.
+fn words(query: Option<&str>) -> Vec<&str> {
+    query.unwrap_or_default().split('&').filter(|word| !word.is_empty()).collect()
+}
+
+fn refused(error: &BadRequest) -> Response {
+    (StatusCode::BAD_REQUEST, typed(TEXT, format!("{error}\n"))).into_response()
 }
 
 async fn events(State(sources): State<Sources>, method: Method) -> Response {

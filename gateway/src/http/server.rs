@@ -16,6 +16,8 @@ use super::events::Events;
 use super::limits::{HEADER_TIME_OUT, Peer, STALL_TIME_OUT, builder};
 use super::routes::{Sources, routes};
 use super::view::View;
+use crate::line_limit::{LineKind, LineLimit, Peer as LinePeer};
+use crate::sys::clock::monotonic_now;
 
 /// Pause after accepting has failed, mostly because the process has no descriptors left.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -30,6 +32,7 @@ pub struct HttpServer {
     connections_max: usize,
     header_time_out: Duration,
     stall_time_out: Duration,
+    limit: Arc<LineLimit>,
 }
 
 /// A server that answers until this is dropped.
@@ -88,7 +91,14 @@ impl HttpServer {
             connections_max: usize::from(connections_max),
             header_time_out: HEADER_TIME_OUT,
             stall_time_out: STALL_TIME_OUT,
+            limit: Arc::default(),
         })
+    }
+
+    /// Shares the limit of lines that peers can have written with others.
+    #[must_use]
+    pub fn limit_lines(self, limit: Arc<LineLimit>) -> Self {
+        Self { limit, ..self }
     }
 
     /// Where it listens.
@@ -148,8 +158,9 @@ impl HttpServer {
                 }
             };
             let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
-                if load.refused.fetch_add(1, Ordering::Relaxed) == 0 {
-                    tracing::warn!(%peer, "HTTP connection refused: too many are open; further ones are counted");
+                load.refused.fetch_add(1, Ordering::Relaxed);
+                if self.limit.admits(monotonic_now(), LineKind::Http, LinePeer::Host(peer.ip())) {
+                    tracing::warn!(%peer, "HTTP connection refused: too many are open");
                 }
                 continue;
             };

@@ -105,6 +105,47 @@ fn status_is_the_object_of_the_command_line() {
 }
 
 #[test]
+fn histories_are_answered_by_axis_level_and_number() {
+    let bench = Bench::start();
+    let json = |path: &str| -> Value {
+        let answer = bench.get(path);
+        assert!(
+            answer.code == 200 && answer.head.contains("content-type: application/json"),
+            "{}",
+            answer.head
+        );
+        serde_json::from_str(&answer.body).unwrap()
+    };
+    let faults = json("/api/v1/faults?axis=slide");
+    assert_eq!(
+        (&faults["faults"][0]["cause"], &faults["faults"][0]["axis"]),
+        (&"over_current".into(), &"slide".into())
+    );
+    assert_eq!(json("/api/v1/faults?axis=turntable")["faults"], Value::Array(Vec::new()));
+    assert_eq!(json("/api/v1/faults"), faults);
+    let texts = |path: &str| -> Vec<String> {
+        let events = json(path)["events"].as_array().unwrap().clone();
+        events.iter().map(|event| event["text"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(texts("/api/v1/log"), ["a line of info", "a line of warn"]);
+    assert_eq!(texts("/api/v1/log?level=warn&lines=5"), ["a line of warn"]);
+    assert_eq!(texts("/api/v1/log?after=2"), [""; 0]);
+    for (path, why) in [
+        ("/api/v1/log?lines=0", "unexpected `lines=0`: expected lines=1 to lines=1000\n"),
+        ("/api/v1/log?after=-1", "`-1` is not a whole number of 64 bits\n"),
+        (
+            "/api/v1/log?level=loud",
+            "unexpected `level=loud`: expected level=error, warn, info, debug or trace\n",
+        ),
+        ("/api/v1/faults?axis=lathe", "unknown axis `lathe`: expected turntable, slide\n"),
+        ("/api/v1/faults?lines=1", "unexpected `lines=1`: expected axis=AXIS\n"),
+    ] {
+        let answer = bench.get(path);
+        assert_eq!((answer.code, answer.body.as_str()), (400, why), "{path}");
+    }
+}
+
+#[test]
 fn health_and_readiness_are_answered_with_reasons() {
     let mut bench = Bench::start();
     let answer = bench.get("/healthz");
@@ -153,7 +194,7 @@ fn every_path_of_the_description_is_answered_and_no_other() {
     let description: Value = serde_json::from_str(&answer.body).unwrap();
     assert_eq!(description, openapi());
     let paths: Vec<&String> = description["paths"].as_object().unwrap().keys().collect();
-    assert_eq!(paths.len(), 9);
+    assert_eq!(paths.len(), 11);
     for path in paths {
         // A stream has no end: its head is enough.
         let answer = bench.ask("HEAD", path);

@@ -6,12 +6,20 @@ use std::time::{Instant, SystemTime};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::health::{Health, Heartbeat};
+use super::health::Health;
+use crate::history::{FaultRecord, Histories, LogEvent, LogQuery, Selection};
 use crate::latest::Reader;
 use crate::local::installation::Installation;
 use crate::local::overview::Overview;
 use crate::status::BoxStatus;
+use crate::status::pulse::Heartbeat;
 use crate::time::source::TimeView;
+
+/// Most lines of the log in an answer: what answers to all connections together take of the memory is bounded.
+pub(super) const HTTP_LINES_MAX: usize = 1_000;
+
+/// Most faults in an answer.
+pub(super) const HTTP_FAULTS_MAX: usize = 200;
 
 /// A view of a running gateway.
 #[derive(Debug)]
@@ -19,6 +27,7 @@ pub struct View {
     installation: Installation,
     status: Reader<BoxStatus>,
     time: TimeView,
+    histories: Histories,
     started: SystemTime,
     /// Of the published status. Only the server's thread takes the lock.
     heartbeat: Mutex<Heartbeat>,
@@ -31,6 +40,35 @@ pub struct Look {
     pub health: Health,
     /// The state of the whole gateway.
     pub status: Overview,
+    /// Whether there is something new in the histories.
+    pub history: Newest,
+}
+
+/// How far the histories are: a viewer that has seen these numbers has seen everything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Newest {
+    /// Number of the newest line of the log.
+    pub log: u64,
+    /// Changes of the history of faults.
+    pub faults: u64,
+}
+
+/// Faults that are present, and faults that were.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct FaultList {
+    /// The faults, newest first.
+    pub faults: Vec<FaultRecord>,
+}
+
+/// Lines of the log.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LogLines {
+    /// The lines, oldest first.
+    pub events: Vec<LogEvent>,
+    /// The number to go on after.
+    pub next: u64,
+    /// Lines after the wanted number that are no longer there.
+    pub missed: u64,
 }
 
 impl View {
@@ -40,10 +78,11 @@ impl View {
         installation: Installation,
         status: Reader<BoxStatus>,
         time: TimeView,
+        histories: Histories,
         started: SystemTime,
     ) -> Self {
         let heartbeat = Mutex::new(Heartbeat::new(Instant::now()));
-        Self { installation, status, time, started, heartbeat }
+        Self { installation, status, time, histories, started, heartbeat }
     }
 
     /// When the gateway has started.
@@ -60,7 +99,29 @@ impl View {
         let age = heartbeat.age(Instant::now(), status.uptime);
         drop(heartbeat);
         let overview = Overview::of(&self.installation, &status, &self.time.read());
-        Look { health: Health::of(&status, age, &overview), status: overview }
+        let history = Newest { log: self.histories.events.newest(), faults: self.histories.faults.changes() };
+        Look { health: Health::of(&status, age, &overview), status: overview, history }
+    }
+
+    /// The faults of an axis, or of all.
+    #[must_use]
+    pub fn faults(&self, axis: Option<&str>) -> FaultList {
+        let mut faults = self.histories.faults.list(axis);
+        faults.truncate(HTTP_FAULTS_MAX);
+        FaultList { faults }
+    }
+
+    /// Lines of the log.
+    #[must_use]
+    pub fn log(&self, query: &LogQuery) -> LogLines {
+        let Selection { events, next, missed } = self.histories.events.select(query);
+        LogLines { events: events.iter().map(|event| LogEvent::clone(event)).collect(), next, missed }
+    }
+
+    /// Names of the axes.
+    #[must_use]
+    pub fn axes(&self) -> Vec<String> {
+        self.installation.axes.iter().map(|axis| axis.name.clone()).collect()
     }
 }
 
@@ -68,7 +129,10 @@ impl View {
 pub(super) mod tests {
     use std::time::Duration;
 
+    use profile_generic::fault::{Fault, FaultCause};
+
     use super::*;
+    use crate::engine::notice::Notice;
     use crate::latest::{Publisher, latest};
     use crate::local::installation::tests::installation as names;
     use crate::status::tests::distinct;
@@ -83,7 +147,25 @@ pub(super) mod tests {
     pub fn view() -> (View, Publisher<BoxStatus>) {
         let (publisher, reader) = latest(distinct());
         let started = SystemTime::UNIX_EPOCH + Duration::from_millis(1_700_000_000_250);
-        (View::new(installation(), reader, TimeView::of(synchronized()), started), publisher)
+        let time = TimeView::of(synchronized());
+        (View::new(installation(), reader, time, histories(), started), publisher)
+    }
+
+    /// A fault that the drive has explained, and two lines of the log.
+    pub fn histories() -> Histories {
+        let histories = Histories::default();
+        for (level, axis) in [("info", None), ("warn", Some("slide"))] {
+            histories.events.push(LogEvent {
+                level: level.to_owned(),
+                axis: axis.map(str::to_owned),
+                text: format!("a line of {level}"),
+                ..LogEvent::default()
+            });
+        }
+        let fault = Fault::new(FaultCause::OVER_CURRENT, profile_generic::time::SystemTime(5));
+        let fault = Notice::Fault { axis: 1, fault, loss: None, trip: None, jump: None };
+        histories.faults.note(&fault, &installation());
+        histories
     }
 
     #[test]

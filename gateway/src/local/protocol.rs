@@ -16,8 +16,9 @@ use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 
 use super::drive::job::{Act, Ask, Listing};
-use crate::config::AxisKind;
+use crate::config::{AxisKind, LogLevel};
 use crate::engine::local::{Failure, Generator, Jog, Move, Order};
+use crate::history::{LINES_MAX, LogQuery};
 use crate::mapping::Mapping;
 use crate::parameter::id::Id;
 use crate::status::AxisStatus;
@@ -71,6 +72,13 @@ pub enum Request {
     Axes,
     /// List the parameters.
     Parameters,
+    /// Show lines of the log.
+    Log(LogQuery),
+    /// List the faults.
+    Faults {
+        /// Position of the axis in the configuration, from 0; all axes without it.
+        axis: Option<usize>,
+    },
     /// Read or write a parameter.
     Parameter {
         /// Position of the axis in the configuration, from 0.
@@ -106,7 +114,7 @@ pub enum Request {
 pub enum BadRequest {
     /// The first word is none of the protocol's.
     #[error(
-        "unknown word `{0}`: expected box, axes, status, enable, disable, stop, reset, jog, move, home, parameters, list, read, write or command"
+        "unknown word `{0}`: expected box, axes, status, log, faults, enable, disable, stop, reset, jog, move, home, parameters, list, read, write or command"
     )]
     Word(String),
     /// The word needs an axis.
@@ -157,6 +165,14 @@ pub enum BadRequest {
         /// What may stand there.
         expected: &'static str,
     },
+    /// More lines of the log than there are in an answer, or none.
+    #[error("unexpected `{text}`: expected lines=1 to lines={most}")]
+    Lines {
+        /// The text.
+        text: String,
+        /// How many there can be.
+        most: usize,
+    },
     /// The line is too long.
     #[error("the line is longer than {LINE_MAX} bytes")]
     TooLong,
@@ -192,6 +208,13 @@ pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Resu
         "box" => Request::Box,
         "axes" => Request::Axes,
         "parameters" => Request::Parameters,
+        "log" => Request::Log(log_query(&mut words, axes, LINES_MAX)?),
+        "faults" => {
+            let name = words.next();
+            Request::Faults {
+                axis: name.map(|name| axis("faults", &mut std::iter::once(name), axes)).transpose()?,
+            }
+        }
         "read" => access("read", &mut words, axes, parameters)?,
         "write" => match direct_write(line, axes)? {
             Some(request) => return Ok(request),
@@ -216,6 +239,54 @@ pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Resu
         None => Ok(request),
         Some(text) => Err(BadRequest::Unexpected { text: text.to_owned(), expected: "the end of the line" }),
     }
+}
+
+/// The axis whose faults are wanted, as a program asks for it over HTTP.
+pub(crate) fn fault_query(words: &[&str], axes: &[String]) -> Result<Option<String>, BadRequest> {
+    let mut wanted = None;
+    for text in words {
+        let unexpected = || BadRequest::Unexpected { text: (*text).to_owned(), expected: "axis=AXIS" };
+        let name = text.strip_prefix("axis=").ok_or_else(unexpected)?;
+        let place = axis("faults", &mut std::iter::once(name), axes)?;
+        wanted = axes.get(place).cloned();
+    }
+    Ok(wanted)
+}
+
+/// Which lines of the log are wanted, at most so many.
+pub(crate) fn log_query<'a>(
+    words: &mut impl Iterator<Item = &'a str>,
+    axes: &[String],
+    most: usize,
+) -> Result<LogQuery, BadRequest> {
+    let mut query = LogQuery::default();
+    for text in words {
+        let expected = "after=N, lines=N, level=LEVEL or axis=AXIS";
+        let unexpected = || BadRequest::Unexpected { text: text.to_owned(), expected };
+        let (name, value) = text.split_once('=').ok_or_else(unexpected)?;
+        let whole = || value.parse().map_err(|_| BadRequest::Whole(value.to_owned()));
+        match name {
+            "after" => query.after = Some(whole()?),
+            "lines" => {
+                let lines: u64 = whole()?;
+                let lines = usize::try_from(lines).ok().filter(|lines| (1..=most).contains(lines));
+                query.lines = lines.ok_or_else(|| BadRequest::Lines { text: text.to_owned(), most })?;
+            }
+            "level" => {
+                let level = LogLevel::ALL.into_iter().find(|level| level.name() == value);
+                query.level = level.ok_or_else(|| BadRequest::Unexpected {
+                    text: text.to_owned(),
+                    expected: "level=error, warn, info, debug or trace",
+                })?;
+            }
+            "axis" => {
+                let place = axis("log", &mut std::iter::once(value), axes)?;
+                query.axis = axes.get(place).cloned();
+            }
+            _ => return Err(unexpected()),
+        }
+    }
+    Ok(query)
 }
 
 fn access<'a>(

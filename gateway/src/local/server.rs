@@ -8,6 +8,7 @@
 //! A client that disconnects, hangs up, or does not read its replies loses its axes: they stop.
 
 use std::collections::{HashMap, VecDeque};
+use std::fmt::Write as _;
 use std::io;
 use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
@@ -26,9 +27,12 @@ use super::protocol::{self, BadRequest, LINE_MAX, NamedParameter};
 use crate::config::AxisKind;
 use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
+use crate::history::{Histories, LogQuery, Selection};
 use crate::latest::Reader;
+use crate::line_limit::{LineKind, LineLimit, Peer};
 use crate::parameter::known::Catalogue;
 use crate::status::BoxStatus;
+use crate::sys::clock::monotonic_now;
 use crate::time::source::TimeView;
 
 /// Clients connected at the same time.
@@ -63,15 +67,47 @@ pub struct Shared {
     pub installation: Installation,
     /// System time.
     pub time: TimeView,
+    /// What has happened.
+    pub histories: Histories,
+    /// How many lines clients can have written into the log.
+    pub limit: Arc<LineLimit>,
 }
 
 impl Shared {
+    /// Whether a line about clients of this user is to be written.
+    fn admits(&self, kind: LineKind, user: Option<u32>) -> bool {
+        self.limit.admits(monotonic_now(), kind, user.map_or(Peer::Unknown, Peer::User))
+    }
+
     /// The whole gateway, as the reply to `box`.
     fn overview(&self) -> String {
         let overview = Overview::of(&self.installation, &self.status.read(), &self.time.read());
         // The object has texts, numbers and lists, and nothing that JSON does not know.
         let json = serde_json::to_string(&overview).unwrap_or_default();
         format!("ok box {json}\n")
+    }
+
+    /// Lines of the log, each as an object.
+    fn log(&self, query: &LogQuery) -> String {
+        let Selection { events, next, missed } = self.histories.events.select(query);
+        let mut text = String::new();
+        for event in &events {
+            let _ = writeln!(text, "event {}", serde_json::to_string(&**event).unwrap_or_default());
+        }
+        let _ = writeln!(text, "ok log {} next={next} missed={missed}", events.len());
+        text
+    }
+
+    /// The faults of an axis or of all, newest first, each as an object.
+    fn faults(&self, axis: Option<usize>) -> String {
+        let name = axis.and_then(|axis| self.names.get(axis)).map(String::as_str);
+        let records = self.histories.faults.list(name);
+        let mut text = String::new();
+        for record in &records {
+            let _ = writeln!(text, "fault {}", serde_json::to_string(record).unwrap_or_default());
+        }
+        let _ = writeln!(text, "ok faults {}", records.len());
+        text
     }
 
     /// The state of an axis in the words of the protocol.
@@ -160,11 +196,11 @@ impl LocalServer {
             tokio::select! {
                 accepted = listener.accept() => match accepted {
                     Ok((stream, _)) => {
-                        if let Some(stream) = admit(stream, uid, clients.len()) {
+                        if let Some((stream, user)) = admit(stream, uid, clients.len(), &shared) {
                             last = last.wrapping_add(1).max(1);
                             let (answers, for_client) = mpsc::channel(PENDING_MAX);
                             clients.insert(last, answers);
-                            let client = Client { id: last, shared: Arc::clone(&shared), to_hub: to_hub.clone() };
+                            let client = Client { id: last, user, shared: Arc::clone(&shared), to_hub: to_hub.clone() };
                             tokio::spawn(client.run(stream, for_client));
                         }
                     }
@@ -214,23 +250,30 @@ fn hand_on(clients: &mut HashMap<ClientId, mpsc::Sender<ToClient>>, client: Clie
 }
 
 /// Lets a client in: one of the gateway's own user or of root, as long as there is room.
-fn admit(stream: UnixStream, uid: u32, clients: usize) -> Option<UnixStream> {
-    match stream.peer_cred() {
-        Ok(peer) if may_connect(peer.uid(), uid) => {}
+fn admit(stream: UnixStream, uid: u32, clients: usize, shared: &Shared) -> Option<(UnixStream, u32)> {
+    let refused = |user| shared.admits(LineKind::LocalRefused, user);
+    let user = match stream.peer_cred() {
+        Ok(peer) if may_connect(peer.uid(), uid) => peer.uid(),
         Ok(peer) => {
-            warn!(uid = peer.uid(), "local control refused a client of another user");
+            if refused(Some(peer.uid())) {
+                warn!(uid = peer.uid(), "local control refused a client of another user");
+            }
             return None;
         }
         Err(error) => {
-            warn!(%error, "local control refused a client of an unknown user");
+            if refused(None) {
+                warn!(%error, "local control refused a client of an unknown user");
+            }
             return None;
         }
-    }
+    };
     if clients >= CLIENTS_MAX {
-        warn!(limit = CLIENTS_MAX, "local control refused a client: too many are connected");
+        if refused(Some(user)) {
+            warn!(uid = user, limit = CLIENTS_MAX, "local control refused a client: too many are connected");
+        }
         return None;
     }
-    Some(stream)
+    Some((stream, user))
 }
 
 /// Whether a user may control axes: the one that runs the gateway, and root.
@@ -241,18 +284,28 @@ const fn may_connect(peer: u32, own: u32) -> bool {
 /// The task of one client.
 struct Client {
     id: ClientId,
+    /// Whose process it is.
+    user: u32,
     shared: Arc<Shared>,
     to_hub: mpsc::Sender<ToHub>,
 }
 
 impl Client {
     async fn run(self, mut stream: UnixStream, answers: mpsc::Receiver<ToClient>) {
-        info!(client = self.id, "local control: client connected");
+        // A program that asks for the state every second is not worth two lines each time.
+        let shown = self.shared.admits(LineKind::LocalClient, Some(self.user));
+        if shown {
+            info!(client = self.id, "local control: client connected");
+        }
         let ended = self.serve(&mut stream, answers).await;
         let _ = self.to_hub.send(ToHub::Gone { client: self.id }).await;
         match ended {
-            Ok(()) => info!(client = self.id, "local control: client disconnected"),
-            Err(error) => warn!(client = self.id, %error, "local control: connection lost"),
+            Ok(()) if shown => info!(client = self.id, "local control: client disconnected"),
+            Ok(()) => {}
+            Err(error) if self.shared.admits(LineKind::LocalRefused, Some(self.user)) => {
+                warn!(client = self.id, %error, "local control: connection lost");
+            }
+            Err(_) => {}
         }
     }
 
@@ -329,6 +382,8 @@ impl Client {
                 Err(protocol::done("status", &names[axis], &self.shared.state(axis)))
             }
             protocol::Request::Parameters => Err(protocol::parameter_list(parameters)),
+            protocol::Request::Log(query) => Err(self.shared.log(&query)),
+            protocol::Request::Faults { axis } => Err(self.shared.faults(axis)),
             _ if pending >= PENDING_MAX => Err(protocol::bad(line, &BadRequest::TooMany)),
             protocol::Request::Order { axis, order } => {
                 let request = Request::Order { client, id, axis: number(axis), order };
@@ -460,7 +515,9 @@ impl Lines {
 mod tests {
     use std::os::unix::fs::MetadataExt as _;
 
+    use profile_generic::fault::{Fault, FaultCause};
     use profile_generic::parameter::{Access, Parameter};
+    use profile_generic::time::SystemTime;
     use profile_sercos::wire::attribute::{Attribute, Format, ItemLength};
     use profile_sercos::wire::idn::Idn;
     use profile_sercos::wire::svc::Element;
@@ -471,7 +528,9 @@ mod tests {
     use crate::config::TimeSource;
     use crate::engine::direct::{DirectFailure, Direction, Target};
     use crate::engine::local::Failure;
+    use crate::engine::notice::Notice;
     use crate::engine::parameter::ParameterFailure;
+    use crate::history::LogEvent;
     use crate::latest::latest;
     use crate::mapping::Mapping;
     use crate::parameter::known::Bus;
@@ -482,6 +541,7 @@ mod tests {
     /// A server, and the engine's side of its queues.
     struct Bench {
         path: PathBuf,
+        histories: Histories,
         requests: rtrb::Consumer<Request>,
         answers: rtrb::Producer<Answer>,
         direct: Direct,
@@ -524,6 +584,8 @@ mod tests {
                 axes: [("x", AxisKind::Rotary), ("y", AxisKind::Linear)].map(named).to_vec(),
             },
             time: TimeView::of(TimeStatus::ptp(&follower)),
+            histories: Histories::default(),
+            limit: Arc::default(),
         }
     }
 
@@ -543,9 +605,11 @@ mod tests {
             std::fs::create_dir_all(&folder).unwrap();
             let path = folder.join("socket");
             let (ends, (requests, answers), direct) = queues();
-            let (server, file) = LocalServer::bind(&path, shared(), ends).unwrap();
+            let shared = shared();
+            let histories = shared.histories.clone();
+            let (server, file) = LocalServer::bind(&path, shared, ends).unwrap();
             tokio::spawn(server.run());
-            Self { path, requests, answers, direct, _file: file, folder }
+            Self { path, histories, requests, answers, direct, _file: file, folder }
         }
 
         async fn connect(&self) -> BufReader<UnixStream> {
@@ -655,6 +719,47 @@ mod tests {
         assert_eq!((overview.name.as_str(), axes), ("cell", vec![("x", "rev"), ("y", "mm")]));
         assert_eq!((overview.time.source.as_str(), overview.time.synchronized), ("ptp", false));
         assert_eq!(overview.cycles.phase_error_ns, -789);
+    }
+
+    #[tokio::test]
+    async fn histories_are_objects_on_lines_of_their_own() {
+        let bench = Bench::start("histories");
+        let mut client = bench.connect().await;
+        say(&mut client, "log\nfaults\nfaults y\n").await;
+        assert_eq!(hear(&mut client).await, "ok log 0 next=0 missed=0\n");
+        assert_eq!(hear(&mut client).await, "ok faults 0\n");
+        assert_eq!(hear(&mut client).await, "ok faults 0\n");
+        for (axis, text) in [(None, "one"), (Some("y"), "two"), (None, "three")] {
+            let axis = axis.map(str::to_owned);
+            let text = text.to_owned();
+            bench.histories.events.push(LogEvent {
+                axis,
+                text,
+                level: "info".to_owned(),
+                ..LogEvent::default()
+            });
+        }
+        let fault = Fault::new(FaultCause::OVER_CURRENT, SystemTime(5));
+        let fault = Notice::Fault { axis: 1, fault, loss: None, trip: None, jump: None };
+        bench.histories.faults.note(&fault, &shared().installation);
+        say(&mut client, "log after=1 lines=1\nlog axis=y level=info\nfaults\nlog axis=z\nlog lines=0\n")
+            .await;
+        let object = |line: String, word: &str| -> serde_json::Value {
+            serde_json::from_str(line.strip_prefix(word).unwrap_or_else(|| panic!("{line}"))).unwrap()
+        };
+        assert_eq!(object(hear(&mut client).await, "event ")["text"], "two");
+        assert_eq!(hear(&mut client).await, "ok log 1 next=2 missed=0\n");
+        assert_eq!(object(hear(&mut client).await, "event ")["number"], 2);
+        assert_eq!(hear(&mut client).await, "ok log 1 next=3 missed=0\n");
+        let fault = object(hear(&mut client).await, "fault ");
+        assert_eq!(
+            (&fault["axis"], &fault["cause"], &fault["end"]),
+            (&"y".into(), &"over_current".into(), &serde_json::Value::Null)
+        );
+        assert_eq!(hear(&mut client).await, "ok faults 1\n");
+        assert_eq!(hear(&mut client).await, "error log - no-axis: unknown axis `z`: expected x, y\n");
+        let wrong = "error log - syntax: unexpected `lines=0`: expected lines=1 to lines=10000\n";
+        assert_eq!(hear(&mut client).await, wrong);
     }
 
     #[tokio::test]

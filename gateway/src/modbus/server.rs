@@ -19,7 +19,9 @@ use tokio_modbus::server::tcp::Server;
 use super::map::{Refusal, registers};
 use super::parameters::Parameters;
 use crate::latest::Reader;
+use crate::line_limit::{LineKind, LineLimit, Peer};
 use crate::status::BoxStatus;
+use crate::sys::clock::monotonic_now;
 
 /// A client that has sent nothing for this long gives its place up.
 const IDLE: Duration = Duration::from_secs(120);
@@ -43,6 +45,7 @@ pub struct ModbusServer {
     clients_max: u8,
     idle: Duration,
     parameters: Parameters,
+    limit: Arc<LineLimit>,
 }
 
 impl ModbusServer {
@@ -52,13 +55,25 @@ impl ModbusServer {
     /// The address cannot be had.
     pub async fn bind(address: SocketAddr, clients_max: u8) -> io::Result<Self> {
         let listener = TcpListener::bind(address).await?;
-        Ok(Self { listener, clients_max, idle: IDLE, parameters: Parameters::default() })
+        Ok(Self {
+            listener,
+            clients_max,
+            idle: IDLE,
+            parameters: Parameters::default(),
+            limit: Arc::default(),
+        })
     }
 
     /// The same with registers that are parameters of drives.
     #[must_use]
     pub fn with_parameters(self, parameters: Parameters) -> Self {
         Self { parameters, ..self }
+    }
+
+    /// Shares the limit of lines that peers can have written with others.
+    #[must_use]
+    pub fn limit_lines(self, limit: Arc<LineLimit>) -> Self {
+        Self { limit, ..self }
     }
 
     /// Where it listens.
@@ -76,13 +91,15 @@ impl ModbusServer {
     pub async fn run(self, source: impl StatusSource) -> io::Result<()> {
         let places = Arc::new(Semaphore::new(usize::from(self.clients_max)));
         let source: Arc<dyn StatusSource> = Arc::new(source);
-        let (idle, parameters) = (self.idle, self.parameters);
+        let (idle, parameters, limit) = (self.idle, self.parameters, self.limit);
         let on_connected = |stream: TcpStream, peer: SocketAddr| {
             let place = Arc::clone(&places).try_acquire_owned().ok();
-            let (source, parameters) = (Arc::clone(&source), parameters.clone());
+            let (source, parameters, limit) = (Arc::clone(&source), parameters.clone(), Arc::clone(&limit));
             async move {
                 let Some(place) = place else {
-                    tracing::warn!(%peer, "Modbus client refused: too many clients are connected");
+                    if limit.admits(monotonic_now(), LineKind::Modbus, Peer::Host(peer.ip())) {
+                        tracing::warn!(%peer, "Modbus client refused: too many clients are connected");
+                    }
                     return Ok(None);
                 };
                 tracing::debug!(%peer, "Modbus client connected");

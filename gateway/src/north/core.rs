@@ -1,15 +1,17 @@
 //! What needs no socket: the adapter, the way to the motion device, and what is counted and told.
 
 use std::net::SocketAddrV4;
+use std::sync::Arc;
 
 use profile_cip::device::adapter::{Adapter, DEVICE_TIMEOUT};
 use profile_cip::device::event::Event;
-use profile_cip::device::motion_link::{MotionReply, MotionRequest, OpenParameters};
+use profile_cip::device::motion_link::{AssemblyRole, MotionReply, MotionRequest, OpenParameters};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::link::AdapterEnd;
 use super::statistics::Statistics;
 use crate::capture::recorder::Tap;
+use crate::line_limit::{LineKind, LineLimit, Peer};
 use crate::sys::clock::realtime_now;
 use crate::sys::gate::Admitted;
 
@@ -38,6 +40,8 @@ pub(super) struct Core {
     pub on_event: Option<OnEvent>,
     pub on_open: Option<OnOpen>,
     pub on_admit: Option<OnAdmit>,
+    /// How many lines peers can have written.
+    pub limit: Arc<LineLimit>,
     /// Whose datagrams are let through now.
     admitted: Option<Admitted>,
     /// Where answers to datagrams come from.
@@ -67,6 +71,7 @@ impl Core {
             on_event: None,
             on_open: None,
             on_admit: None,
+            limit: Arc::default(),
             admitted: None,
             address,
             held: None,
@@ -91,7 +96,7 @@ impl Core {
         self.send_requests(now);
         self.link.tell_connections(self.adapter.explicit_connections());
         while let Some(event) = self.adapter.poll_event() {
-            self.note(&event);
+            self.note(now, &event);
         }
         let waiting = self.held.is_some() || (self.owed > 0 && now < self.owed_until);
         self.poll_at = now + if waiting { POLL_AWAITING } else { POLL_IDLE };
@@ -157,7 +162,7 @@ impl Core {
         Some((answer, len))
     }
 
-    fn note(&mut self, event: &Event) {
+    fn note(&mut self, now: MonotonicTime, event: &Event) {
         let statistics = &mut self.statistics;
         statistics.events += 1;
         match event {
@@ -166,16 +171,18 @@ impl Core {
             Event::MotionLost { .. } => statistics.motion_lost += 1,
             _ => {}
         }
-        match event {
-            Event::MotionLost { .. }
-            | Event::ExplicitLost { .. }
-            | Event::SessionLost { .. }
-            | Event::DeviceSilent { .. }
-            | Event::OpenRefused { .. }
-            | Event::Reset { .. } => {
-                tracing::warn!("{event}");
+        if limited(event).is_none_or(|(kind, peer)| self.limit.admits(now, kind, peer)) {
+            match event {
+                Event::MotionLost { .. }
+                | Event::ExplicitLost { .. }
+                | Event::SessionLost { .. }
+                | Event::DeviceSilent { .. }
+                | Event::OpenRefused { .. }
+                | Event::Reset { .. } => {
+                    tracing::warn!("{event}");
+                }
+                _ => tracing::info!("{event}"),
             }
-            _ => tracing::info!("{event}"),
         }
         if let Some(on_event) = &mut self.on_event {
             on_event(event);
@@ -183,7 +190,105 @@ impl Core {
     }
 }
 
+/// What the line of an event counts as; `None` for one that is always written: what changes the gateway is.
+fn limited(event: &Event) -> Option<(LineKind, Peer)> {
+    Some(match event {
+        Event::OpenRefused { originator, .. } => (LineKind::Open, host(*originator)),
+        Event::ExplicitLost { originator: peer, .. } | Event::SessionLost { peer, .. } => {
+            (LineKind::Lost, host(*peer))
+        }
+        Event::DeviceSilent { .. } => (LineKind::Silent, Peer::Unknown),
+        // Of an owner each matters; anybody may only listen.
+        Event::AssemblyOpened { role, .. }
+        | Event::AssemblyClosed { role, .. }
+        | Event::AssemblyLost { role, .. }
+            if *role == AssemblyRole::ExclusiveOwner =>
+        {
+            return None;
+        }
+        Event::AssemblyOpened { originator, .. } => (LineKind::Open, host(*originator)),
+        Event::AssemblyLost { originator, .. } => (LineKind::Lost, host(*originator)),
+        Event::AssemblyClosed { .. } => (LineKind::Lost, Peer::Unknown),
+        // As fast as the motion device takes them, and each matters.
+        Event::MotionOpened { .. }
+        | Event::MotionClosed { .. }
+        | Event::MotionLost { .. }
+        | Event::Reset { .. }
+        | Event::QosChanged(_)
+        | Event::InactivityTimeoutChanged { .. }
+        | Event::TimeSyncSet(_) => return None,
+    })
+}
+
+/// A peer, whatever port it comes from.
+pub(super) fn host(address: SocketAddrV4) -> Peer {
+    Peer::Host((*address.ip()).into())
+}
+
 /// Whether a message of the motion device is the answer to a request.
 const fn answers(reply: &MotionReply) -> bool {
     !matches!(reply, MotionReply::ConnectionLost { .. })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+
+    use profile_cip::device::motion_link::ConnectionTriad;
+
+    use super::*;
+    use crate::history::lines_of;
+    use crate::north::{motion_link, test_adapter_config};
+
+    fn core(limit: &Arc<LineLimit>) -> Core {
+        let adapter = Adapter::new(test_adapter_config(Ipv4Addr::LOCALHOST)).unwrap();
+        let (link, _device) = motion_link();
+        let address = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 44_818);
+        let core = Core::new(adapter, link, None, address, MonotonicTime::ZERO);
+        Core { limit: Arc::clone(limit), ..core }
+    }
+
+    fn refused(number: u16) -> Event {
+        let originator = SocketAddrV4::new(Ipv4Addr::new(192, 0, 2, 7), number);
+        let triad = ConnectionTriad { connection_serial: number, originator_vendor: 1, originator_serial: 2 };
+        Event::OpenRefused { triad, originator, general: 1, extended: 0x0106, found: None, expected: None }
+    }
+
+    #[test]
+    fn ten_thousand_refused_forward_opens_in_a_minute_are_few_lines_with_their_count() {
+        let limit = Arc::new(LineLimit::default());
+        let mut core = core(&limit);
+        let at = |number: u16| MonotonicTime::ZERO + DurationNs::from_millis(i64::from(number) * 5);
+        let lines = lines_of(|| {
+            for number in 0..10_000 {
+                core.note(at(number), &refused(number));
+                limit.report(at(number), &[]);
+            }
+            limit.report(at(15_000), &[]);
+        });
+        assert_eq!(core.statistics.events, 10_000);
+        let texts: Vec<&str> = lines.iter().map(|line| line.text.as_str()).collect();
+        assert_eq!(lines.len(), 5, "{texts:?}");
+        assert!(
+            texts[..4].iter().all(|text| text.contains("192.0.2.7") && text.contains("0x0106")),
+            "{texts:?}"
+        );
+        let count = "Forward_Open refused: more such lines were left out in the last minute peer=192.0.2.7 count=9996";
+        assert_eq!((texts[4], lines[4].level.as_str()), (count, "warn"));
+    }
+
+    #[test]
+    fn what_changes_the_gateway_is_always_written() {
+        let mut core = core(&Arc::default());
+        let lines = lines_of(|| {
+            for seconds in 0..50 {
+                core.note(MonotonicTime::ZERO, &Event::InactivityTimeoutChanged { seconds });
+            }
+        });
+        assert_eq!(lines.len(), 50);
+        assert_eq!(
+            (lines[49].kind.as_str(), lines[49].text.as_str()),
+            ("ethernet-ip", "session inactivity time-out 49 s")
+        );
+    }
 }

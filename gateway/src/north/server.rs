@@ -4,6 +4,7 @@ use std::fmt;
 use std::future::{Future, poll_fn};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::pin::pin;
+use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -16,13 +17,14 @@ use tokio::net::{TcpListener, TcpStream, UdpSocket};
 use tokio::sync::watch;
 use tokio::time::sleep;
 
-use super::core::Core;
+use super::core::{Core, host};
 use super::error::ServeError;
 use super::link::AdapterEnd;
 use super::sockets::{Sockets, prepare};
 use super::statistics::Statistics;
 use super::stream::{Ending, Stream};
 use crate::capture::recorder::Tap;
+use crate::line_limit::{LineKind, LineLimit};
 use crate::sys::clock::{monotonic_now, realtime_now};
 use crate::sys::gate::Admitted;
 
@@ -139,6 +141,13 @@ impl ExplicitServer {
         self
     }
 
+    /// Shares the limit of lines that peers can have written with others.
+    #[must_use]
+    pub fn limit_lines(mut self, limit: Arc<LineLimit>) -> Self {
+        self.core.limit = limit;
+        self
+    }
+
     /// Where it listens, TCP and UDP.
     #[must_use]
     pub const fn local_address(&self) -> SocketAddrV4 {
@@ -252,8 +261,6 @@ struct Traffic {
     datagrams: Vec<Datagrams>,
     streams: Vec<Stream>,
     stall_limit: Duration,
-    /// Whether the last stream was refused: told once, until one is accepted.
-    refusing: bool,
     buffer: Box<[u8; DATAGRAM_LEN_MAX]>,
 }
 
@@ -268,7 +275,6 @@ impl Traffic {
             datagrams: datagrams.collect(),
             streams: Vec::with_capacity(STREAMS_MAX),
             stall_limit,
-            refusing: false,
             buffer: Box::new([0; DATAGRAM_LEN_MAX]),
         })
     }
@@ -283,7 +289,7 @@ impl Traffic {
             }
             Err(ending) => {
                 moved = true;
-                ended(stream, ending, core);
+                ended(stream, ending, now, core);
                 false
             }
         });
@@ -324,14 +330,12 @@ impl Traffic {
         let crowded = self.streams.len() >= STREAMS_MAX;
         let slot = if crowded { None } else { core.adapter.open(now, peer) };
         let Some(slot) = slot else {
-            if !self.refusing {
+            if core.limit.admits(now, LineKind::Stream, host(peer)) {
                 tracing::warn!(%peer, at = %local, "stream refused: too many streams are open");
             }
-            self.refusing = true;
             core.statistics.refused += 1;
             return;
         };
-        self.refusing = false;
         if let Err(error) = prepare(&tcp) {
             tracing::debug!(%peer, %error, "a stream cannot be set up as it should be");
         }
@@ -376,12 +380,14 @@ impl Traffic {
 }
 
 /// Lets go of a stream that has ended.
-fn ended(stream: &mut Stream, ending: Ending, core: &mut Core) {
+fn ended(stream: &mut Stream, ending: Ending, now: MonotonicTime, core: &mut Core) {
     let peer = stream.peer;
     match ending {
         Ending::Stalled => {
             core.statistics.stalled += 1;
-            tracing::warn!(%peer, "stream closed: the peer does not read what is sent to it");
+            if core.limit.admits(now, LineKind::Stalled, host(peer)) {
+                tracing::warn!(%peer, "stream closed: the peer does not read what is sent to it");
+            }
         }
         Ending::Failed(error) => tracing::debug!(%peer, %error, "stream broken"),
         Ending::Closed => {

@@ -10,6 +10,7 @@ mod can_watch;
 mod cycle;
 mod indicators;
 pub mod port;
+mod scribe;
 mod strangers;
 
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
@@ -27,12 +28,13 @@ use profile_cip::device::identity::{Health, ModuleState};
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
-use tracing::{debug, info, warn};
+use tracing::{info, warn};
 
 use self::can_watch::CanWatch;
 use self::cycle::{CycleThread, Ended, Setup};
 use self::indicators::{Change, Shown};
 use self::port::{CanSocketPort, OpenPort, PacketPort, PortError, UdpPort};
+use self::scribe::Scribe;
 use self::strangers::DropWatch;
 use crate::capture::can_bus::CanProtocol;
 use crate::capture::recorder::{Recorder, Settings, Tap};
@@ -42,12 +44,13 @@ use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
 use crate::engine::direct::DirectNorth;
 use crate::engine::local::LocalNorth;
-use crate::engine::notice::{Notice, Severity};
 use crate::engine::port::CanPort;
 use crate::engine::registers::RegisterNorth;
+use crate::history::Histories;
 use crate::host::HostPort;
 use crate::http::{HttpServer, RunningServer, View};
 use crate::latest::Reader;
+use crate::line_limit::LineLimit;
 use crate::local::installation::Installation;
 use crate::local::protocol::NamedParameter;
 use crate::local::{LocalServer, Shared, SocketFile};
@@ -177,6 +180,8 @@ pub struct RunningBox {
     time: TimeService,
     /// The HTTP server; it ends when this is dropped.
     http: Option<RunningServer>,
+    /// What has happened.
+    histories: Histories,
     /// The socket of local control, removed at the end.
     _socket: Option<SocketFile>,
 }
@@ -197,6 +202,8 @@ pub struct Extras<'a> {
     pub capture: Option<&'a Path>,
     /// Offers local control on this Unix socket.
     pub local: Option<&'a Path>,
+    /// What has happened so far; without it the histories begin here, and the log is not among them.
+    pub histories: Option<&'a Histories>,
 }
 
 /// Starts a box with these tables; `settings` has what controllers set.
@@ -247,13 +254,22 @@ pub fn start(
         }
         settings.apply(&device.name, adapter);
         let address = SocketAddrV4::new(device.listen, PORT_IO);
-        // Nothing comes in before there is a connection.
-        let (socket, gate) = IoSocket::bind_closed(address, adapter.qos.urgent)?;
+        // Nothing comes in before there is a connection. That of a device with assemblies stays open: it has several
+        // connections, and the gate lets one through.
+        let (socket, gate) = match device.assembly {
+            None => {
+                let (socket, gate) = IoSocket::bind_closed(address, adapter.qos.urgent)?;
+                (socket, Some(Arc::new(gate)))
+            }
+            Some(_) => (IoSocket::bind(address, adapter.qos.urgent)?, None),
+        };
         let system = |source| BindError::System { address, step: "dup", source };
-        markers.push((socket.marker().map_err(system)?, Arc::new(gate)));
+        markers.push((socket.marker().map_err(system)?, gate));
         north.push(UdpPort::new(socket, tap()));
     }
 
+    let histories = extras.histories.cloned().unwrap_or_default();
+    let limit = Arc::new(LineLimit::default());
     let (time, feed) = TimeService::start(&config.time, &clock_place(&adapters, &ports))?;
 
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -275,10 +291,14 @@ pub fn start(
         let (source, asked) = (status.clone(), Arc::clone(&restart));
         let (kept, keeper, name) = (Arc::clone(settings), Arc::clone(settings), device.name.clone());
         let (clock, clock_source, setter) = (time.view(), config.time.source, time.setter());
-        let mut drops = DropWatch::new(Arc::clone(&gate), SocketAddrV4::new(device.listen, PORT_IO));
+        let address = SocketAddrV4::new(device.listen, PORT_IO);
+        let mut drops = gate.as_ref().map(|gate| DropWatch::new(Arc::clone(gate), address));
         let server = ExplicitServer::bind(device.listen, adapter, end, tap())?
+            .limit_lines(Arc::clone(&limit))
             .attend(move |adapter| {
-                drops.look();
+                if let Some(drops) = &mut drops {
+                    drops.look();
+                }
                 let of_axes = health(&source.read(), number);
                 let minor_recoverable = of_axes.minor_recoverable || kept.is_unsaved();
                 adapter.set_health(Health { minor_recoverable, ..of_axes });
@@ -295,7 +315,9 @@ pub fn start(
             })
             .on_admit(move |admitted| {
                 // The cycle refuses what the kernel lets through, at its own cost.
-                if let Err(error) = gate.set(admitted) {
+                if let Some(gate) = &gate
+                    && let Err(error) = gate.set(admitted)
+                {
                     warn!(%error, "the kernel does not drop foreign datagrams");
                 }
             })
@@ -317,7 +339,8 @@ pub fn start(
         let server = runtime
             .block_on(ModbusServer::bind(modbus.listen, modbus.clients_max))
             .map_err(|source| StartError::Modbus { address: modbus.listen, source })?
-            .with_parameters(parameters);
+            .with_parameters(parameters)
+            .limit_lines(Arc::clone(&limit));
         info!(address = %modbus.listen, "Modbus TCP");
         let source = status.clone();
         runtime.spawn(async move {
@@ -326,14 +349,28 @@ pub fn start(
             }
         });
     }
-    let http = config.http.map(|http| serve_http(http, config, &status, &time)).transpose()?;
+    let http =
+        config.http.map(|http| serve_http(http, config, &status, &time, &histories, &limit)).transpose()?;
     let socket = extras
         .local
-        .map(|path| serve_local((path, config), &mut engine, &status, time.view(), &runtime))
+        .map(|path| {
+            let shared = Shared {
+                names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
+                kinds: config.axes.iter().map(|axis| axis.kind).collect(),
+                parameters: NamedParameter::of(engine.mapping()),
+                catalogue: Catalogue::of(config, engine.mapping()),
+                status: status.clone(),
+                installation: Installation::of(config),
+                time: time.view(),
+                histories: histories.clone(),
+                limit: Arc::clone(&limit),
+            };
+            serve_local(path, shared, &mut engine, &runtime)
+        })
         .transpose()?;
     let stop_notices = Arc::new(AtomicBool::new(false));
-    let names = config.axes.iter().map(|axis| axis.name.clone()).collect();
-    runtime.spawn(log_notices(notices, names, Arc::clone(&stop_notices)));
+    let scribe = Scribe::new(Installation::of(config), histories.clone(), status.clone(), limit);
+    runtime.spawn(scribe.run(notices, Arc::clone(&stop_notices)));
     let devices = config.devices.iter().map(|device| device.name.clone()).collect();
     let axes = config.axes.iter().map(|axis| axis.name.clone()).collect();
     runtime.spawn(log_indicators(status.clone(), devices, axes, Arc::clone(&stop_notices)));
@@ -356,6 +393,7 @@ pub fn start(
         axes,
         time,
         http,
+        histories,
         _socket: socket,
     })
 }
@@ -366,11 +404,15 @@ fn serve_http(
     config: &Config,
     status: &Reader<BoxStatus>,
     time: &TimeService,
+    histories: &Histories,
+    limit: &Arc<LineLimit>,
 ) -> Result<RunningServer, StartError> {
     let failed = |source| StartError::Http { address: http.listen, source };
     let server = HttpServer::bind(http.listen, http.connections_max).map_err(failed)?;
+    let server = server.limit_lines(Arc::clone(limit));
     let address = server.local_address().map_err(failed)?;
-    let view = View::new(Installation::of(config), status.clone(), time.view(), WallClock::now());
+    let (names, histories) = (Installation::of(config), histories.clone());
+    let view = View::new(names, status.clone(), time.view(), histories, WallClock::now());
     let running =
         server.start(view).map_err(|source| StartError::Thread { what: "the HTTP server", source })?;
     info!(%address, "HTTP");
@@ -404,22 +446,12 @@ fn modbus_parameters(
 
 /// Offers local control of all axes on a socket.
 fn serve_local(
-    (path, config): (&Path, &Config),
+    path: &Path,
+    shared: Shared,
     engine: &mut Engine,
-    status: &Reader<BoxStatus>,
-    time: TimeView,
     runtime: &tokio::runtime::Runtime,
 ) -> Result<SocketFile, StartError> {
-    let (local, end) = LocalNorth::new(config.axes.len());
-    let shared = Shared {
-        names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
-        kinds: config.axes.iter().map(|axis| axis.kind).collect(),
-        parameters: NamedParameter::of(engine.mapping()),
-        catalogue: Catalogue::of(config, engine.mapping()),
-        status: status.clone(),
-        installation: Installation::of(config),
-        time,
-    };
+    let (local, end) = LocalNorth::new(shared.names.len());
     let (direct, accesses) = DirectNorth::new();
     let (server, file) = LocalServer::bind(path, shared, (end, accesses))
         .map_err(|source| StartError::Local { path: path.display().to_string(), source })?;
@@ -530,29 +562,6 @@ fn secret() -> u64 {
     RandomState::new().build_hasher().finish()
 }
 
-/// Logs what the cycle thread has to tell, until it has ended.
-async fn log_notices(mut notices: rtrb::Consumer<Notice>, axes: Vec<String>, stop: Arc<AtomicBool>) {
-    let mut interval = tokio::time::interval(NOTICE_INTERVAL);
-    loop {
-        interval.tick().await;
-        let last = stop.load(Ordering::Relaxed);
-        while let Ok(notice) = notices.pop() {
-            let axis = notice.axis().and_then(|axis| axes.get(usize::from(axis))).map(String::as_str);
-            match (notice.severity(), axis) {
-                (Severity::Detail, Some(axis)) => debug!(axis, "{notice}"),
-                (Severity::Detail, None) => debug!("{notice}"),
-                (Severity::Info, Some(axis)) => info!(axis, "{notice}"),
-                (Severity::Info, None) => info!("{notice}"),
-                (Severity::Warning, Some(axis)) => warn!(axis, "{notice}"),
-                (Severity::Warning, None) => warn!("{notice}"),
-            }
-        }
-        if last {
-            return;
-        }
-    }
-}
-
 /// Logs what the indicators show whenever it changes, until the box has ended.
 async fn log_indicators(
     status: Reader<BoxStatus>,
@@ -585,6 +594,12 @@ impl RunningBox {
     #[must_use]
     pub fn status(&self) -> BoxStatus {
         self.status.read()
+    }
+
+    /// Where the status is read from, also while the box is stopped.
+    #[must_use]
+    pub fn reader(&self) -> Reader<BoxStatus> {
+        self.status.clone()
     }
 
     /// The state of system time.
@@ -640,6 +655,7 @@ impl RunningBox {
         // Viewers see the stop until here.
         drop(self.http);
         self.runtime.shutdown_timeout(Duration::from_secs(1));
+        self.histories.faults.close();
         let summary = self.recorder.map(Recorder::finish).transpose()?;
         Ok(Stopped { dropped: summary.map(|summary| summary.dropped), unrested })
     }

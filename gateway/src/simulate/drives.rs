@@ -68,6 +68,7 @@ pub fn linear() -> ServoParameters {
         position_error_tolerance: Position(20 * MILLIMETRE),
         in_position_window: Position(MILLIMETRE / 100),
         standstill_window: Velocity(MILLIMETRE),
+        at_velocity_window: Velocity(MILLIMETRE),
         marker_distance: Position(20 * MILLIMETRE),
         ..ServoParameters::default()
     }

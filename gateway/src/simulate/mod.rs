@@ -14,6 +14,7 @@ pub mod devicenet_drive;
 pub mod drive_events;
 pub mod drives;
 pub mod grandmaster;
+pub mod plc;
 pub mod program;
 pub mod script;
 pub mod sercos_twin;

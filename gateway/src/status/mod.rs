@@ -1,6 +1,7 @@
 //! The state of the box as its servers show it: one fixed-size value, published by the cycle thread.
 
 mod bus;
+pub mod pulse;
 mod wait;
 
 use std::net::Ipv4Addr;

@@ -259,6 +259,7 @@ pub(super) fn push_notices(node: &mut Node, said: &[Notice], number: usize, axis
         | Notice::Refused { .. }
         | Notice::Logged { .. }
         | Notice::NotEqual { .. }
+        | Notice::OtherNameplate { .. }
         | Notice::NotReturned { .. }
         | Notice::Scaling { .. }
         | Notice::DriveSays { .. }

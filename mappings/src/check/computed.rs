@@ -3,6 +3,7 @@
 //! The ranges of the operands are those of their parameters, or else what the drive's bytes can hold. They are carried through the
 //! rows exactly: an interval ends where one of its operands ends, as sums, products and quotients rise or fall all the way.
 
+use crate::own_values::{OF_CONFIGURATION, OF_GATEWAY};
 use profile_generic::image::Signal;
 use profile_generic::parameter::Parameter;
 use profile_generic::ratio::quotient;
@@ -66,8 +67,10 @@ pub(super) fn bindings(mapping: &Mapping, findings: &mut Findings) {
     for (row, computation) in rows(mapping) {
         let is_drives = |read: &&Read| read.signal.is_none() && !read.is_zero_if_missing;
         let is_computed = |parameter: &Parameter| {
-            let of_gateway = [Parameter::MOTOR_TURNS_PER_UNIT, Parameter::SYSTEM_INERTIA];
-            of_gateway.contains(parameter) || generic.computation(*parameter).is_some()
+            *parameter == Parameter::SYSTEM_INERTIA
+                || OF_GATEWAY.contains(parameter)
+                || OF_CONFIGURATION.contains(parameter)
+                || generic.computation(*parameter).is_some()
         };
         let reads = computation.reads.iter().filter(is_drives).filter_map(|read| read.parameter);
         for parameter in reads.filter(|parameter| !is_computed(parameter)) {

@@ -116,16 +116,16 @@ pub enum DevicenetError {
     /// No operating mode.
     #[error("expected at least one operating mode, got none")]
     NoMode,
-    /// No [[mode]] row of cip-generic.toml has it.
+    /// No `[[mode]]` row of cip-generic.toml has it.
     #[error("no [[mode]] row of cip-generic.toml for operating mode {0}")]
     Mode(ModeSelection),
-    /// No [[cyclic]] row of cip-generic.toml has it.
+    /// No `[[cyclic]]` row of cip-generic.toml has it.
     #[error("no [[cyclic]] row of cip-generic.toml for {0}")]
     Signal(Signal),
-    /// No [[request]] row of cip-generic.toml has it.
+    /// No `[[request]]` row of cip-generic.toml has it.
     #[error("no [[request]] row of cip-generic.toml for what every drive needs")]
     Request,
-    /// No [[attribute]] row of cip-generic.toml has it as REAL.
+    /// No `[[attribute]]` row of cip-generic.toml has it as REAL.
     #[error("no attribute of cip-generic.toml holds {0}")]
     Parameter(Parameter),
     /// It is no output assembly.

@@ -1,5 +1,6 @@
 //! Signals and parameters of the generic model, the parameters that overlays add to it, and what is computed from them.
 
+use crate::own_values::OF_GATEWAY;
 use profile_generic::functional_element::FunctionalElement;
 use profile_generic::image::Signal;
 use profile_generic::parameter::{Access, Parameter, ParameterType};
@@ -166,10 +167,9 @@ impl GenericDictionary {
     pub fn is_cyclic(&self, parameter: Parameter) -> bool {
         let is_known = |read: &Read| {
             read.signal.is_some()
-                || read.parameter.is_some_and(|parameter| {
-                    // Known from the scaling of the drive.
-                    parameter == Parameter::MOTOR_TURNS_PER_UNIT || self.is_setting(parameter)
-                })
+                || read
+                    .parameter
+                    .is_some_and(|parameter| OF_GATEWAY.contains(&parameter) || self.is_setting(parameter))
         };
         self.computation(parameter).is_some_and(|computation| {
             let mut operands = computation.rows.iter().flat_map(|row| row.operation.operands());

@@ -72,5 +72,5 @@ fn every_standard_exception_has_a_source_or_a_reason() {
         }
     }
     assert_eq!(wrong, Vec::<String>::new());
-    assert_eq!(mapping.cip.unraised.len(), 21);
+    assert_eq!(mapping.cip.unraised.len(), 20);
 }

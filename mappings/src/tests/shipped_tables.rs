@@ -155,7 +155,7 @@ fn no_fault_of_a_drive_is_one_of_the_node() {
 fn every_idn_of_the_profile_is_bound_or_has_a_reason() {
     let mapping = shipped();
     let profile = mapping.dictionaries.sercos.idns().iter().filter(|row| row.part == IdnPart::Profile);
-    assert_eq!((profile.count(), mapping.sercos.unbound.len()), (395, 288));
+    assert_eq!((profile.count(), mapping.sercos.unbound.len()), (395, 284));
     assert_eq!(mapping.sercos.unanswered, []);
 }
 
@@ -164,6 +164,6 @@ fn every_idn_of_the_profile_is_bound_or_has_a_reason() {
 fn every_object_of_cia_402_is_bound_or_has_a_reason() {
     let mapping = shipped();
     let objects = mapping.dictionaries.cia402.objects().len();
-    assert_eq!((objects, mapping.cia402.unbound.len()), (194, 127));
+    assert_eq!((objects, mapping.cia402.unbound.len()), (194, 126));
     assert_eq!(mapping.cia402.unanswered, Vec::<u16>::new());
 }

@@ -35,7 +35,7 @@ impl NodeId {
     /// Checks a number.
     ///
     /// # Errors
-    /// [`Error::Value`] for 0 and for more than 127.
+    /// [`Error::value()`] for 0 and for more than 127.
     pub const fn new(number: u8) -> Result<Self, Error> {
         match number {
             1..=127 => Ok(Self(number)),

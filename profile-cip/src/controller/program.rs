@@ -3,7 +3,7 @@
 //! Axes are named by their instance number, from 1. Positions, velocities and so on are in units of the
 //! program, which are the velocity control units of the device: velocities and accelerations go out as they
 //! stand here, positions in counts by
-//! [`AxisSetup::counts_per_unit`](super::config::AxisSetup::counts_per_unit).
+//! the [`Scaling`](super::config::Scaling) of the axis.
 
 use core::fmt;
 

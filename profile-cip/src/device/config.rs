@@ -6,6 +6,7 @@ use core::net::Ipv4Addr;
 use std::sync::Arc;
 
 use super::port::{InterfaceType, LinkState};
+use crate::assembly::Assemblies;
 use crate::wire::class1::SEQUENCE_COUNT_LEN;
 use crate::wire::encapsulation::{EXPLICIT_PORT, IO_PORT};
 use crate::wire::epath::ElectronicKey;
@@ -18,6 +19,9 @@ pub const DEVICE_TYPE_CIP_MOTION_DRIVE: u16 = 0x25;
 pub const DEVICE_TYPE_CIP_MOTION_ENCODER: u16 = 0x2F;
 /// Device type of CIP Motion converters.
 pub const DEVICE_TYPE_CIP_MOTION_CONVERTER: u16 = 0x30;
+
+/// Device type of a device without a profile of its own: Generic Device (keyable).
+pub const DEVICE_TYPE_GENERIC: u16 = 0x2B;
 
 /// Most axis instances of a device on EtherNet/IP (IEC 61800-7-302).
 pub const AXES_MAX: usize = 16;
@@ -54,6 +58,9 @@ pub struct AdapterConfig {
     pub qos: QosConfig,
     /// The motion connection.
     pub motion: MotionConfig,
+    /// Assemblies in place of the Motion Device Axis Object and its connection; intervals of their connections are those of
+    /// `motion`.
+    pub assembly: Option<Assemblies>,
     /// Electronic data sheet of the device, served by the File object; empty for none, and then there is no such
     /// object. At most [`EDS_LEN_MAX`] bytes.
     pub eds: Arc<[u8]>,
@@ -352,6 +359,7 @@ pub(crate) mod tests {
                 power_structure_class_id: 0x0A0B_0C0D,
                 power_structure_axis_ids: ArrayVec::from_iter([0x11, 0x22]),
             },
+            assembly: None,
             eds: Arc::new([]),
             incarnation: 0x7A00,
         }

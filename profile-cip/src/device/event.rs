@@ -1,7 +1,7 @@
 //! What the adapter tells the application, for its log and its duties.
 
 use crate::device::config::QosConfig;
-use crate::device::motion_link::ConnectionTriad;
+use crate::device::motion_link::{AssemblyRole, ConnectionTriad};
 use crate::device::objects::time_sync::TimeSyncSetting;
 use crate::wire::status::Service;
 use core::fmt;
@@ -35,6 +35,37 @@ pub enum Event {
     },
     /// The motion connection timed out: no controller-to-device datagram for too long.
     MotionLost {
+        /// The connection, by the numbers of its Forward_Open.
+        triad: ConnectionTriad,
+        /// Whose.
+        originator: SocketAddrV4,
+        /// Silence in microseconds.
+        silent_us: u64,
+        /// Permitted silence in microseconds.
+        timeout_us: u64,
+    },
+    /// A connection to assemblies is open.
+    AssemblyOpened {
+        /// What its originator may do.
+        role: AssemblyRole,
+        /// The connection, by the numbers of its Forward_Open.
+        triad: ConnectionTriad,
+        /// Whose.
+        originator: SocketAddrV4,
+        /// Packet intervals in microseconds, O->T and T->O.
+        intervals_us: (u32, u32),
+    },
+    /// A connection to assemblies was closed by its originator.
+    AssemblyClosed {
+        /// What its originator could do.
+        role: AssemblyRole,
+        /// The connection, by the numbers of its Forward_Open.
+        triad: ConnectionTriad,
+    },
+    /// A connection to assemblies timed out, or a listen-only one has nothing to listen to any more.
+    AssemblyLost {
+        /// What its originator could do.
+        role: AssemblyRole,
         /// The connection, by the numbers of its Forward_Open.
         triad: ConnectionTriad,
         /// Whose.
@@ -117,6 +148,22 @@ impl fmt::Display for Event {
             Self::MotionLost { triad, originator, silent_us, timeout_us } => {
                 write!(f, "motion {triad} of {originator} timed out: ")?;
                 silence(f, silent_us, timeout_us)
+            }
+            Self::AssemblyOpened { role, triad, originator, intervals_us: (o_to_t, t_to_o) } => {
+                let role = role.name();
+                write!(f, "{role} {triad} opened by {originator}, intervals {o_to_t} us and {t_to_o} us")
+            }
+            Self::AssemblyClosed { role, triad } => {
+                write!(f, "{} {triad} closed by its originator", role.name())
+            }
+            Self::AssemblyLost { role, triad, originator, silent_us, timeout_us }
+                if silent_us > timeout_us =>
+            {
+                write!(f, "{} {triad} of {originator} timed out: ", role.name())?;
+                silence(f, silent_us, timeout_us)
+            }
+            Self::AssemblyLost { role, triad, originator, .. } => {
+                write!(f, "{} {triad} of {originator} ended with the last connection of others", role.name())
             }
             Self::OpenRefused { triad, originator, general, extended, found, expected } => {
                 write!(f, "{triad} of {originator} refused with {general:#04x}/{extended:#06x}")?;

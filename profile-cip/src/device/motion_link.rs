@@ -90,6 +90,39 @@ impl MotionRequest {
     }
 }
 
+/// A connection to the assemblies of a device, beside what it has in common with the motion connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AssemblyOpen {
+    /// What the originator may do on it.
+    pub role: AssemblyRole,
+    /// Requested packet interval of the target-to-originator direction in microseconds; [`OpenParameters::rpi_us`] is that
+    /// of the other one.
+    pub t_to_o_rpi_us: u32,
+}
+
+/// What an originator may do on a connection to assemblies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AssemblyRole {
+    /// It owns the output assembly; there is one.
+    ExclusiveOwner,
+    /// It gets the input assembly, whether or not there is an owner.
+    InputOnly,
+    /// It gets the input assembly as long as another connection that is no listen-only one does.
+    ListenOnly,
+}
+
+impl AssemblyRole {
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ExclusiveOwner => "exclusive owner",
+            Self::InputOnly => "input only",
+            Self::ListenOnly => "listen only",
+        }
+    }
+}
+
 /// The motion I/O connection as the Forward_Open asked for it; every value has been checked and accepted.
 ///
 /// O->T is the controller-to-device direction, T->O the device-to-controller direction.
@@ -124,8 +157,10 @@ pub struct OpenParameters {
     /// Code point that marks device-to-controller datagrams, 0..=63: the QoS object's for the priority of this
     /// direction.
     pub t_to_o_dscp: u8,
-    /// Format revision of the connection data (the I/O connection point of the path).
+    /// Format revision of the connection data (the I/O connection point of the path); 0 with assemblies.
     pub format_revision: u8,
+    /// A connection to assemblies in place of the motion connection.
+    pub assembly: Option<AssemblyOpen>,
 }
 
 /// Which connection ends.

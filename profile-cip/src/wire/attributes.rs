@@ -46,7 +46,7 @@ impl<'a> AttributeIds<'a> {
     /// Writes request data with these numbers and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] for more than 65535 numbers.
+    /// [`Error::truncated`]; [`Error::too_large`] for more than 65535 numbers.
     pub fn emit(ids: &[u16], buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("attribute count", length_u16("attribute count", ids.len())?)?;

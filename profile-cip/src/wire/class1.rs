@@ -43,7 +43,7 @@ impl<'a> Class1Datagram<'a> {
     /// Reads exactly one datagram.
     ///
     /// # Errors
-    /// [`Error::truncated`], [`Error::trailing`], [`Error::Invalid`] for other items or counts.
+    /// [`Error::truncated`], [`Error::trailing`], [`Error::invalid`] for other items or counts.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         expect(&mut r, "item count", 2)?;
@@ -67,7 +67,7 @@ impl<'a> Class1Datagram<'a> {
     /// Writes the datagram and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] for more than 65533 bytes of data.
+    /// [`Error::truncated`]; [`Error::too_large`] for more than 65533 bytes of data.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         Self::emit_header(
             self.connection_id,

@@ -77,7 +77,7 @@ impl<'a> CommonPacket<'a> {
     /// Reads exactly one list.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for more than [`ITEMS_MAX`] items, [`Error::truncated`], [`Error::trailing`].
+    /// [`Error::too_large`] for more than [`ITEMS_MAX`] items, [`Error::truncated`], [`Error::trailing`].
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let packet = Self::read(&mut r)?;
@@ -107,7 +107,7 @@ impl<'a> CommonPacket<'a> {
     /// Writes the list and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] for an item of more than 65535 bytes.
+    /// [`Error::truncated`]; [`Error::too_large`] for an item of more than 65535 bytes.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("item count", length_u16("item count", self.items.len())?)?;

@@ -171,7 +171,7 @@ impl<'a> Packet<'a> {
     /// Writes the packet and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] if the data is longer than the length field can say.
+    /// [`Error::truncated`]; [`Error::too_large`] if the data is longer than the length field can say.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let header = Header {
             command: self.command,
@@ -204,7 +204,7 @@ impl fmt::Display for Packet<'_> {
 /// A length as the 16-bit field that carries it.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] naming `what` above 65535.
+/// [`Error::too_large`] naming `what` above 65535.
 pub(crate) fn length_u16(what: &'static str, length: usize) -> Result<u16, Error> {
     u16::try_from(length)
         .map_err(|_| Error::too_large(what, u32::from(u16::MAX), u32::try_from(length).unwrap_or(u32::MAX)))
@@ -213,7 +213,7 @@ pub(crate) fn length_u16(what: &'static str, length: usize) -> Result<u16, Error
 /// A length in bytes as the 8-bit count of 16-bit words that carries it.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] naming `what` above 510 bytes, [`Error::Invalid`] for an odd length.
+/// [`Error::too_large`] naming `what` above 510 bytes, [`Error::invalid`] for an odd length.
 pub(crate) fn words_u8(what: &'static str, length: usize) -> Result<u8, Error> {
     let value = u32::try_from(length).unwrap_or(u32::MAX);
     if !length.is_multiple_of(2) {

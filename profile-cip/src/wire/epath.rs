@@ -166,7 +166,7 @@ impl<'a> Segment<'a> {
     /// Reads one segment where `r` stands.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::Invalid`] naming the field for segments that are reserved or not
+    /// [`Error::truncated`]; [`Error::invalid`] naming the field for segments that are reserved or not
     /// supported.
     // Flat: one arm per kind of segment.
     pub fn read(r: &mut Reader<'a>, encoding: Encoding) -> Result<Self, Error> {
@@ -293,7 +293,7 @@ impl<'a> Segment<'a> {
     /// Writes the segment where `w` stands.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a value its segment cannot
+    /// [`Error::truncated`]; [`Error::too_large`] and [`Error::invalid`] for a value its segment cannot
     /// carry.
     // Flat: one arm per kind of segment.
     pub fn write(&self, w: &mut Writer<'_>, encoding: Encoding) -> Result<(), Error> {

@@ -54,7 +54,7 @@ impl<'a> ForwardClose<'a> {
     /// Writes the request data and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd
+    /// [`Error::truncated`]; [`Error::too_large`] and [`Error::invalid`] for a path too long or of odd
     /// length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
@@ -106,7 +106,7 @@ impl<'a> ForwardCloseReply<'a> {
     /// Writes the reply data and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long
+    /// [`Error::truncated`]; [`Error::too_large`] and [`Error::invalid`] for an application reply too long
     /// or odd.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);

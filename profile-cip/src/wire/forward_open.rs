@@ -143,8 +143,8 @@ impl<'a> ForwardOpen<'a> {
     /// Writes the request data and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] for a size above 511 in the small form or a path above 510
-    /// bytes; [`Error::Invalid`] for a path of odd length.
+    /// [`Error::truncated`]; [`Error::too_large`] for a size above 511 in the small form or a path above 510
+    /// bytes; [`Error::invalid`] for a path of odd length.
     // Flat: one line per field, each with its error.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
@@ -259,7 +259,7 @@ impl<'a> ForwardOpenReply<'a> {
     /// Writes the reply data and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for an application reply too long
+    /// [`Error::truncated`]; [`Error::too_large`] and [`Error::invalid`] for an application reply too long
     /// or odd.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);

@@ -49,7 +49,7 @@ impl<'a> IdentityItem<'a> {
     /// Reads the item's data.
     ///
     /// # Errors
-    /// [`Error::truncated`], [`Error::trailing`], [`Error::Invalid`] for an address family other than IPv4.
+    /// [`Error::truncated`], [`Error::trailing`], [`Error::invalid`] for an address family other than IPv4.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let protocol_version = r.u16("protocol version")?;
@@ -86,7 +86,7 @@ impl<'a> IdentityItem<'a> {
     /// Writes the item's data and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] for a name above 255 bytes.
+    /// [`Error::truncated`]; [`Error::too_large`] for a name above 255 bytes.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
         w.u16("protocol version", self.protocol_version)?;

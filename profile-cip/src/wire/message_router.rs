@@ -32,7 +32,7 @@ impl<'a> Request<'a> {
     /// Reads a request; everything behind the path is data.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::Invalid`] if the service has the reply bit.
+    /// [`Error::truncated`]; [`Error::invalid`] if the service has the reply bit.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let service = r.u8("service")?;
@@ -53,7 +53,7 @@ impl<'a> Request<'a> {
     /// Writes the request and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a path too long or of odd
+    /// [`Error::truncated`]; [`Error::too_large`] and [`Error::invalid`] for a path too long or of odd
     /// length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);
@@ -93,7 +93,7 @@ impl<'a> Reply<'a> {
     /// Reads a reply; everything behind the extended status is data.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::Invalid`] without the reply bit; [`Error::OutOfRange`] for more than
+    /// [`Error::truncated`]; [`Error::invalid`] without the reply bit; [`Error::too_large`] for more than
     /// [`EXTENDED_STATUS_MAX`] words of extended status.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);

@@ -23,7 +23,7 @@ impl<'a> MultipleService<'a> {
     /// Checks count and offsets.
     ///
     /// # Errors
-    /// [`Error::truncated`] if the list does not fit the data; [`Error::Invalid`] for an offset into the
+    /// [`Error::truncated`] if the list does not fit the data; [`Error::invalid`] for an offset into the
     /// list, before its predecessor, or past the end.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
@@ -82,7 +82,7 @@ pub fn buffer_len(messages: &[&[u8]]) -> usize {
 /// Writes a packet with these messages and returns its length.
 ///
 /// # Errors
-/// [`Error::truncated`]; [`Error::OutOfRange`] if an offset exceeds 65535.
+/// [`Error::truncated`]; [`Error::too_large`] if an offset exceeds 65535.
 pub fn emit(messages: &[&[u8]], buffer: &mut [u8]) -> Result<usize, Error> {
     let mut w = Writer::new(buffer);
     w.u16("service count", length_u16("service count", messages.len())?)?;

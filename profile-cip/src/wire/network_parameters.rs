@@ -91,7 +91,7 @@ impl NetworkParameters {
     /// The 16-bit form.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a size above [`SMALL_SIZE_MAX`].
+    /// [`Error::too_large`] for a size above [`SMALL_SIZE_MAX`].
     pub fn to_u16(&self) -> Result<u16, Error> {
         if self.size > SMALL_SIZE_MAX {
             let (value, max) = (u32::from(self.size), u32::from(SMALL_SIZE_MAX));

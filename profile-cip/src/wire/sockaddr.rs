@@ -27,7 +27,7 @@ impl SockaddrInfo {
     /// Reads exactly this block. The last eight bytes are ignored, as some senders leave them unset.
     ///
     /// # Errors
-    /// [`Error::truncated`], [`Error::trailing`], [`Error::Invalid`] for another address family.
+    /// [`Error::truncated`], [`Error::trailing`], [`Error::invalid`] for another address family.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let mut r = Reader::new(bytes);
         let value = Self::read(&mut r)?;
@@ -38,7 +38,7 @@ impl SockaddrInfo {
     /// Reads the block where `r` stands.
     ///
     /// # Errors
-    /// [`Error::truncated`], [`Error::Invalid`] for another address family.
+    /// [`Error::truncated`], [`Error::invalid`] for another address family.
     pub fn read(r: &mut Reader<'_>) -> Result<Self, Error> {
         let offset = r.offset();
         let family = u16::from_be_bytes(r.array("sockaddr family")?);

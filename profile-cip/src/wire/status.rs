@@ -97,6 +97,8 @@ open_code! {
         INVALID_APPLICATION_PATH = 0x0117 => "invalid produced or consumed application path",
         /// The path to the configuration is not valid, or does not go with the rest.
         INVALID_CONFIGURATION_PATH = 0x0118 => "invalid or inconsistent configuration application path",
+        /// There is no connection that a listen-only one could listen to.
+        NON_LISTEN_ONLY_NOT_OPENED = 0x0119 => "non-listen-only connection not opened",
         /// The transport class is not supported.
         CLASS_NOT_SUPPORTED = 0x011C => "transport class not supported",
         /// The production trigger is not supported.

@@ -57,7 +57,7 @@ impl<'a> UnconnectedSend<'a> {
     /// Writes the request data and returns its length.
     ///
     /// # Errors
-    /// [`Error::truncated`]; [`Error::OutOfRange`] and [`Error::Invalid`] for a message or route too long, or
+    /// [`Error::truncated`]; [`Error::too_large`] and [`Error::invalid`] for a message or route too long, or
     /// a route of odd length.
     pub fn emit(&self, buffer: &mut [u8]) -> Result<usize, Error> {
         let mut w = Writer::new(buffer);

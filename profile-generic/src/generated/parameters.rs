@@ -48,6 +48,26 @@ parameter_rows! {
         "Highest velocity in both directions.";
     TORQUE_LIMIT_BIPOLAR = 0x0416, "torque_limit_bipolar", BasicDrive, Torque, Integer, Read,
         "Highest torque in both directions.";
+    VELOCITY_THRESHOLD = 0x0417, "velocity_threshold", BasicDrive, Velocity, Integer, Write,
+        "Velocity below which the gateway shows it to be low.";
+    TORQUE_THRESHOLD = 0x0418, "torque_threshold", BasicDrive, Torque, Integer, Write,
+        "Torque above which the gateway shows it to be high.";
+    UNDER_TORQUE_LIMIT = 0x0419, "under_torque_limit", BasicDrive, Torque, Integer, Write,
+        "Torque below which the load is missing.";
+    UNDER_TORQUE_LIMIT_TIME = 0x041A, "under_torque_limit_time", BasicDrive, Time, Integer, Write,
+        "How long the torque may be below that, 0 for not watched.";
+    OVER_SPEED_USER_LIMIT = 0x041B, "over_speed_user_limit", BasicDrive, Fraction, Integer, Write,
+        "Speed above which an exception is raised, of the rated one.";
+    MOTOR_TEMPERATURE_USER_LIMIT = 0x041C, "motor_temperature_user_limit", BasicDrive, Temperature, Integer, Write,
+        "Temperature of the motor above which an exception is raised.";
+    DRIVE_TEMPERATURE_USER_LIMIT = 0x041D, "drive_temperature_user_limit", BasicDrive, Temperature, Integer, Write,
+        "Temperature of the power stage above which an exception is raised.";
+    BUS_OVERVOLTAGE_USER_LIMIT = 0x041E, "bus_overvoltage_user_limit", BasicDrive, Fraction, Integer, Write,
+        "Voltage of the DC bus above which an exception is raised, of the nominal one.";
+    BUS_UNDERVOLTAGE_USER_LIMIT = 0x041F, "bus_undervoltage_user_limit", BasicDrive, Fraction, Integer, Write,
+        "Voltage of the DC bus below which an exception is raised, of the nominal one.";
+    CURRENT_LIMIT = 0x0420, "current_limit", BasicDrive, Torque, Integer, Write,
+        "Highest current of the motor, of the rated one.";
 
     POSITION_LOOP_GAIN = 0x0501, "position_loop_gain", BasicDrive, Gain, Integer, Write,
         "Proportional gain of the position loop.";
@@ -115,6 +135,46 @@ parameter_rows! {
         "From the order to the brake's being closed.";
     BRAKE_RELEASE_TIME = 0x0714, "brake_release_time", ApplicationFunction, Time, Integer, Write,
         "From the order to the brake's being open.";
+    MOTOR_TYPE = 0x0715, "motor_type", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Kind of motor: 1 rotary and 3 linear with permanent magnets, 2 rotary and 4 linear induction motor.";
+    MOTOR_UNIT = 0x0716, "motor_unit", BasicDrive, None, Integer, WriteWhileDisabled,
+        "What the motor moves in: 0 revolutions, 1 metres.";
+    MOTOR_POLE_PITCH = 0x0717, "motor_pole_pitch", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Pole pitch of a linear motor, in nanometres.";
+    MOTOR_LINEAR_RATED_VELOCITY = 0x0718, "motor_linear_rated_velocity", BasicDrive, Velocity, Integer, WriteWhileDisabled,
+        "Rated velocity of a linear motor.";
+    MOTOR_LINEAR_MAX_VELOCITY = 0x0719, "motor_linear_max_velocity", BasicDrive, Velocity, Integer, WriteWhileDisabled,
+        "Highest velocity that a linear motor stands.";
+    MOTOR_MASS = 0x071A, "motor_mass", BasicDrive, Inertia, Integer, WriteWhileDisabled,
+        "Mass of what a linear motor moves of its own.";
+    MOTOR_RATED_FORCE = 0x071B, "motor_rated_force", BasicDrive, TorqueAbsolute, Integer, WriteWhileDisabled,
+        "Rated force of a linear motor.";
+    MOTOR_TORQUE_CONSTANT = 0x071C, "motor_torque_constant", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Torque for an ampere, in micro newton metre.";
+    MOTOR_FORCE_CONSTANT = 0x071D, "motor_force_constant", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Force for an ampere, in micro newton.";
+    MOTOR_VOLTAGE_CONSTANT = 0x071E, "motor_voltage_constant", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Voltage at a thousand revolutions per minute, in microvolt.";
+    MOTOR_LINEAR_VOLTAGE_CONSTANT = 0x071F, "motor_linear_voltage_constant", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Voltage at a metre per second, in microvolt.";
+    MOTOR_RATED_FREQUENCY = 0x0720, "motor_rated_frequency", BasicDrive, Frequency, Integer, WriteWhileDisabled,
+        "Rated frequency of an induction motor.";
+    MOTOR_FLUX_CURRENT = 0x0721, "motor_flux_current", BasicDrive, Current, Integer, WriteWhileDisabled,
+        "Current that magnetises an induction motor.";
+    MOTOR_STATOR_RESISTANCE = 0x0722, "motor_stator_resistance", BasicDrive, Resistance, Integer, WriteWhileDisabled,
+        "Resistance of the stator of an induction motor.";
+    MOTOR_Q_INDUCTANCE = 0x0723, "motor_q_inductance", BasicDrive, Inductance, Integer, WriteWhileDisabled,
+        "Inductance across the magnets.";
+    MOTOR_D_INDUCTANCE = 0x0724, "motor_d_inductance", BasicDrive, Inductance, Integer, WriteWhileDisabled,
+        "Inductance along the magnets.";
+    ENCODER_TYPE = 0x0725, "encoder_type", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Interface of the motor's encoder, as the profile of the controller numbers it.";
+    ENCODER_STARTUP = 0x0726, "encoder_startup", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Where the motor's encoder counts from: 0 where it is at power-up, 1 its own zero.";
+    ENCODER_TURNS = 0x0727, "encoder_turns", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Revolutions that an absolute rotary encoder tells apart.";
+    ENCODER_LENGTH = 0x0728, "encoder_length", BasicDrive, Position, Integer, WriteWhileDisabled,
+        "Length of an absolute linear encoder.";
 
     LOAD_POSITION_ACTUAL = 0x0906, "load_position_actual", BasicDrive, Position, Integer, Read,
         "Actual position of the load feedback.";
@@ -205,6 +265,50 @@ parameter_rows! {
         "Rated output current of the power stage.";
     DRIVE_PEAK_CURRENT = 0x0A10, "drive_peak_current", BasicDrive, Current, Integer, Read,
         "Peak output current of the power stage.";
+    DRIVE_RATED_VOLTAGE = 0x0A11, "drive_rated_voltage", BasicDrive, Voltage, Integer, Read,
+        "Rated output voltage of the power stage.";
+    DRIVE_RATED_POWER = 0x0A12, "drive_rated_power", BasicDrive, Power, Integer, Read,
+        "Rated output power of the power stage.";
+    BUS_CONFIGURATION = 0x0A13, "bus_configuration", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Where the DC bus has its power from, as the profile of the controller numbers it.";
+    MAINS_CLASS = 0x0A14, "mains_class", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Mains that the power stage is for: 0 115, 230 or 460 V, 1 100, 200 or 400 V.";
+    POWER_STRUCTURE_AXIS_ID = 0x0A15, "power_structure_axis_id", BasicDrive, None, Integer, Read,
+        "Number of the power stage, by which a controller knows that it has the right one; 0 is not checked.";
+    ENABLE_INPUT_CHECKING = 0x0A16, "enable_input_checking", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Whether the drive has an enable input without which it gives no torque: 0 or 1.";
+    OPERATIVE_CURRENT_LIMIT = 0x0A17, "operative_current_limit", BasicDrive, Torque, Integer, Read,
+        "Highest current that the drive gives, of the rated one of the motor.";
+    OPERATIVE_PEAK_CURRENT = 0x0A18, "operative_peak_current", BasicDrive, Current, Integer, Read,
+        "The lower of the peak currents of motor and power stage.";
+    MOTOR_TEMPERATURE_LIMIT = 0x0A19, "motor_temperature_limit", BasicDrive, Temperature, Integer, Read,
+        "Temperature of the motor at which the drive faults.";
+    DRIVE_TEMPERATURE_LIMIT = 0x0A1A, "drive_temperature_limit", BasicDrive, Temperature, Integer, Read,
+        "Temperature of the power stage at which the drive faults.";
+    CONVERTER_CURRENT = 0x0A1B, "converter_current", BasicDrive, Current, Integer, Read,
+        "Current of the DC bus.";
+    CONVERTER_POWER = 0x0A1C, "converter_power", BasicDrive, Power, Integer, Read,
+        "Power of the DC bus.";
+    MOTOR_ROTATION = 0x0A1D, "motor_rotation", BasicDrive, Frequency, Integer, Read,
+        "Revolutions of the motor per second.";
+    SYNCHRONOUS_FREQUENCY = 0x0A1E, "synchronous_frequency", BasicDrive, Frequency, Integer, Read,
+        "The same times the pairs of poles.";
+    MOTOR_THERMAL_TIME = 0x0A1F, "motor_thermal_time", BasicDrive, Time, Integer, Read,
+        "Time constant of the warming of the motor.";
+    DRIVE_THERMAL_TIME = 0x0A20, "drive_thermal_time", BasicDrive, Time, Integer, Read,
+        "Time constant of the warming of the power stage.";
+    MOTOR_USE = 0x0A21, "motor_use", BasicDrive, Fraction, Integer, Read,
+        "Use of the motor by its current, as the gateway estimates it with its thermal time constant.";
+    DRIVE_USE = 0x0A22, "drive_use", BasicDrive, Fraction, Integer, Read,
+        "The same with the thermal time constant of the power stage.";
+    RATED_CURRENT_RATIO = 0x0A23, "rated_current_ratio", BasicDrive, Fraction, Integer, Read,
+        "Rated current of the motor, of that of the power stage.";
+    DRIVE_USE_SHARE = 0x0A24, "drive_use_share", BasicDrive, Fraction, Integer, Read,
+        "Estimated use of the power stage, of the rated current of the motor once.";
+    UP_TIME = 0x0A25, "up_time", BasicDrive, Time, Integer, Read,
+        "How long the control of the drive has been up, as far as the gateway has heard it.";
+    HEARD_TIME = 0x0A26, "heard_time", BasicDrive, Time, Integer, Read,
+        "How long the gateway has heard the drive without a break.";
 
     STOPPING_TORQUE = 0x0B04, "stopping_torque", BasicDrive, Torque, Integer, Write,
         "Torque of a stop at the current limit.";
@@ -222,6 +326,8 @@ parameter_rows! {
         "How fast that ramp gets quicker.";
     RAMP_DECELERATION = 0x0B10, "ramp_deceleration", BasicDrive, Acceleration, Integer, Write,
         "How fast that ramp gets slower, and a ramped stop.";
+    ZERO_SPEED = 0x0B11, "zero_speed", BasicDrive, Fraction, Integer, Write,
+        "Speed below which an axis that stops counts as slow, of the rated one.";
 
     HOMING_METHOD = 0x0C01, "homing_method", ApplicationFunction, None, Integer, Write,
         "How the drive homes, as its profile numbers it.";

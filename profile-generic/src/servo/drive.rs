@@ -564,7 +564,10 @@ impl Servo {
         let positions = follows && command.mode == OperatingMode::Position;
         status.set(StatusBits::IN_POSITION, positions && error <= self.parameters.in_position_window.0);
         let speeds = follows && command.mode == OperatingMode::Velocity;
-        status.set(StatusBits::AT_VELOCITY, speeds && velocity_error.abs() <= window);
+        status.set(
+            StatusBits::AT_VELOCITY,
+            speeds && velocity_error.abs() <= units(self.parameters.at_velocity_window.0),
+        );
         status.set(StatusBits::STANDSTILL, self.plant.velocity.abs() <= window);
         status.set(StatusBits::VELOCITY_LIMIT, self.has_torque() && self.control.velocity_limited);
         status.set(StatusBits::TORQUE_LIMIT, self.has_torque() && self.control.torque_limited);

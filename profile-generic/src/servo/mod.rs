@@ -96,8 +96,10 @@ pub struct ServoParameters {
     pub position_error_tolerance: Position,
     /// Distance from the set-point within which the axis is in position.
     pub in_position_window: Position,
-    /// Velocity below which the axis stands, and distance within which it is at velocity.
+    /// Velocity below which the axis stands.
     pub standstill_window: Velocity,
+    /// Distance from the velocity set-point within which the axis is at velocity.
+    pub at_velocity_window: Velocity,
     /// Motor current at rated torque, above zero.
     pub rated_current: Current,
     /// Voltage of the DC bus when it is charged, above zero.
@@ -145,6 +147,7 @@ impl Default for ServoParameters {
             position_error_tolerance: Position(2_000_000_000),
             in_position_window: Position(1_000_000),
             standstill_window: Velocity(50_000_000),
+            at_velocity_window: Velocity(50_000_000),
             rated_current: Current(3_000_000),
             bus_voltage: Voltage(560_000_000),
             ambient_temperature: Temperature(25_000),

@@ -203,6 +203,7 @@ pub(super) fn check(parameters: &ServoParameters) -> Result<(), ServoError> {
         ("position_error_tolerance", parameters.position_error_tolerance.0),
         ("in_position_window", parameters.in_position_window.0),
         ("standstill_window", parameters.standstill_window.0),
+        ("at_velocity_window", parameters.at_velocity_window.0),
     ];
     for (name, value) in above_zero {
         if value <= 0 {

@@ -58,7 +58,7 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// Both, P first: each is at its [`index`](Self::index).
+    /// Both, P first: each is at its `index`.
     pub const ALL: [Channel; 2] = [Channel::Primary, Channel::Secondary];
 
     /// The one that goes the other way round.

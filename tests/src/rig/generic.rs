@@ -300,6 +300,7 @@ impl<S: South> OneAxis<S> {
             mapping,
             buses: Buses::new(vec![bus], vec![0]),
             devices: Vec::new(),
+            assemblies: Vec::new(),
             axes: vec![axis],
             notices: producer,
             publisher,

@@ -186,10 +186,7 @@ fn a_number_or_state_that_is_not_so_is_noticed() {
             "| 5-2.3.24 | Safety. Rows: none. | done | x |",
             "| 5-2.3.24 | Safety. Rows: 6 rejected. | not | x |",
         ),
-        (
-            "| 5-2.3.4.2 | PM. Rows: . | done | x |",
-            "| 5-2.3.4.2 | PM. Rows: 2 parameter, 2 stored. | partly | x |",
-        ),
+        ("| 5-2.3.4.2 | PM. Rows: . | done | x |", "| 5-2.3.4.2 | PM. Rows: 4 parameter. | done | x |"),
         ("| connection | written by it | 0 |", "| connection | written by it | 16 |"),
     ] {
         assert_eq!(corrected(wrong, &mapping).trim_end(), right);

@@ -153,6 +153,99 @@ fn the_parser_of_another_maker_reads_the_sheet_and_finds_nothing_wrong() {
 }
 
 #[test]
+fn the_parser_of_another_maker_reads_the_assemblies_of_a_sheet() {
+    const TEST: &str = "the_parser_of_another_maker_reads_the_assemblies_of_a_sheet";
+    let Some(python) = peer::python_or_skip(TEST, "eds_pie") else { return };
+    let folder = scratch("eds-pie-assembly");
+    let file = folder.join("box.toml");
+    let example = EXAMPLE.replacen("power_structure_class_id = 0", "assembly = { layout = \"position\" }", 1);
+    std::fs::write(&file, example).expect("written");
+    let sheet = folder.join("device.eds");
+    let printed = eds(&["--config", file.to_str().expect("a plain path")]);
+    std::fs::write(&sheet, &printed.stdout).expect("written");
+
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/peers/eds_pie_reader.py");
+    let output = Command::new(python).arg(script).arg(&sheet).output().expect("python starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let got: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let sections = &got["sections"];
+    assert_eq!(sections["Device"]["ProdType"], json!([43]));
+    assert_eq!(sections["Assembly"]["Assem150"], json!(["Output", "20 04 24 96", 32, 0, "", ""]));
+    assert_eq!(sections["Assembly"]["Assem100"], json!(["Input", "20 04 24 64", 40, 0, "", ""]));
+    assert_eq!(
+        sections["Connection Manager"]["Connection1"],
+        json!([
+            0x0401_0002u32,
+            0x4444_0405u32,
+            "Param1",
+            32,
+            "Assem150",
+            "Param1",
+            40,
+            "Assem100",
+            "",
+            "",
+            0,
+            "Assem151",
+            "Exclusive Owner",
+            "Moves the axes of the device",
+            "20 04 24 97 2C 96 2C 64"
+        ])
+    );
+    let bits = |number: u8| {
+        let fields = &sections["Connection Manager"][format!("Connection{number}")];
+        (fields[0].as_u64(), fields[1].as_u64())
+    };
+    assert_eq!(bits(2), (Some(0x0201_0002), Some(0x4444_0305)), "input only");
+    assert_eq!(bits(3), (Some(0x0101_0002), Some(0x4444_0305)), "listen only");
+    assert_eq!(sections["Capacity"]["TSpec1"], json!(["Rx", 38, 500]));
+    let findings: Vec<_> =
+        got["findings"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
+    for finding in &findings {
+        let known = finding.contains("[Time Sync Class]") || finding.contains("{section.keyword,}");
+        assert!(known, "{finding}");
+    }
+}
+
+#[test]
+fn the_assemblies_are_printed_with_their_offsets() {
+    let folder = scratch("assembly-command");
+    let file = folder.join("box.toml");
+    let run = |text: &str, format: &str| {
+        std::fs::write(&file, text).expect("written");
+        let path = file.to_str().expect("a plain path");
+        let mut command = Command::new(axisbridge());
+        command.args(["assembly", "--config", path, "--format", format]);
+        let output = command.output().expect("the program starts");
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let example = EXAMPLE.replacen("power_structure_class_id = 0", "assembly = { layout = \"position\" }", 1);
+    let (code, text, _) = run(&example, "text");
+    assert_eq!(code, Some(0));
+    assert!(text.contains("  output point 150, 32 bytes, 38 in a Forward_Open\n"), "{text}");
+    assert!(text.contains("      20  DINT   slide.target_position_32\n"), "{text}");
+    let (_, json, _) = run(&example, "json");
+    let got: Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!((&got[0]["input"]["point"], &got[0]["input"]["connection_size"]), (&json!(100), &json!(42)));
+    assert_eq!(got[0]["output"]["fields"][9]["offset"], 28);
+    let (_, markdown, _) = run(&example, "markdown");
+    assert!(markdown.contains("| 8 | DINT | turntable | `actual_position_32` |"), "{markdown}");
+    std::fs::write(&file, &example).expect("written");
+    let path = file.to_str().expect("a plain path");
+    let output =
+        Command::new(axisbridge()).args(["attributes", "--config", path]).output().expect("it starts");
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    let expected =
+        "the axes of the device front are moved through assemblies: expected CIP Motion devices only";
+    assert!(error.contains(expected), "{error}");
+    let (code, text, error) = run(EXAMPLE, "text");
+    assert_eq!((code, text.as_str()), (Some(2), ""));
+    assert!(error.contains("no device of the configuration has assemblies"), "{error}");
+}
+
+#[test]
 fn the_device_is_what_its_network_asks_for() {
     let mapping = Mapping::embedded().expect("the shipped tables are good");
     assert_eq!(mapping.dictionaries.cip.networks(), networks());

@@ -13,8 +13,9 @@ use axisbridge::simulate::script::Script;
 use axisbridge_tests::peer;
 use serde_json::{Value, json};
 
-/// Every key of a configuration, in three files since not all of them go together.
-const DOCUMENTS: [&str; 3] = [
+/// Every key of a configuration, in four files since not all of them go together.
+const DOCUMENTS: [&str; 4] = [
+    include_str!("every_key/assembly.toml"),
     include_str!("every_key/sercos.toml"),
     include_str!("every_key/can.toml"),
     include_str!("every_key/devicenet.toml"),
@@ -153,6 +154,8 @@ fn lists() -> Vec<Value> {
         json!(["velocity", "torque"]),
         json!(["csp", "pv"]),
         json!(["inputs"]),
+        json!(["control", "mode", "mode"]),
+        json!(["status", "age"]),
         json!([""]),
     ]
 }

@@ -13,9 +13,14 @@ use serde_json::{Value, json};
 
 /// The shipped example that needs no hardware, at an address of this test; it records what passes.
 fn start_box(address: &str, name: &str) -> (Running, PathBuf) {
+    start_box_of(include_str!("../../../examples/two-axes-in-process.toml"), address, name)
+}
+
+/// As [`start_box`], of a configuration like the example.
+fn start_box_of(example: &str, address: &str, name: &str) -> (Running, PathBuf) {
     let scratch = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
     let config = scratch.join(format!("{name}.toml"));
-    let example = include_str!("../../../examples/two-axes-in-process.toml")
+    let example = example
         .replace("\"127.0.0.2\"", &format!("\"{address}\""))
         .replace("127.0.0.1:1502", &format!("{address}:1502"));
     std::fs::write(&config, example).expect("the scratch folder can be written");
@@ -39,10 +44,15 @@ fn start_box(address: &str, name: &str) -> (Running, PathBuf) {
 
 /// Runs a client's script against the box; the JSON object that it prints.
 fn ask(python: &PathBuf, script: &str, address: &str) -> Value {
+    ask_with(python, script, &[address])
+}
+
+/// As [`ask`], with these arguments.
+fn ask_with(python: &PathBuf, script: &str, arguments: &[&str]) -> Value {
     let script = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/peers")).join(script);
     let output = Command::new(python)
         .arg(&script)
-        .arg(address)
+        .args(arguments)
         .stdin(Stdio::null())
         .output()
         .expect("the client can be started");
@@ -244,6 +254,112 @@ fn ethernetip_opens_runs_and_closes_the_motion_connection() {
     assert!(again.starts_with("0701"), "extended status 0x0107, no such connection: {again}");
     assert_eq!(got["second_opens_after_close"], 0, "the connection is free at once");
     assert_eq!(got["second_closes"], 0);
+}
+
+/// The example with its slide in a device with assemblies at the second address.
+fn with_assembly(example: &str, address: &str) -> String {
+    let device =
+        &example[example.find("[[device]]").expect("a device")..example.find("[[axis]]").expect("an axis")];
+    let second = device
+        .replace("name = \"front\"", "name = \"plc\"")
+        .replace("127.0.0.2", address)
+        .replace("[\"turntable\", \"slide\"]", "[\"slide\"]")
+        .replace("product_code = 1001", "product_code = 1002")
+        .replace("power_structure_class_id = 0", "assembly = { layout = \"position\" }");
+    let both = example.replacen("[\"turntable\", \"slide\"]", "[\"turntable\"]", 1) + "\n" + &second;
+    // It has no part in what is tested, and a busy host keeps it.
+    let slow = both.replace("cycle_time = \"2 ms\"", "cycle_time = \"10 ms\"");
+    slow.replace("min = \"2 ms\", max = \"16 ms\"", "min = \"5 ms\", max = \"50 ms\"")
+}
+
+#[test]
+fn ethernetip_moves_an_axis_through_assemblies_beside_a_motion_device() {
+    const ADDRESS: &str = "127.0.0.66";
+    const MOTION: &str = "127.0.0.65";
+    const TEST: &str = "ethernetip_moves_an_axis_through_assemblies_beside_a_motion_device";
+    let Some(python) = peer::python_or_skip(TEST, "ethernetip") else { return };
+    let example = with_assembly(include_str!("../../../examples/two-axes-in-process.toml"), ADDRESS);
+    let (mut running, capture) = start_box_of(&example, MOTION, "foreign-assembly");
+    let got = ask_with(&python, "ethernetip_assembly.py", &[ADDRESS, MOTION]);
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+
+    assert_eq!((&got["device_type"], &got["motion_device_type"]), (&json!(43), &json!(37)));
+    assert_eq!(got["at_the_motion_device"], 0x0117, "it has no assemblies");
+    assert_eq!((&got["long"], &got["short"]), (&json!(0x0127), &json!(0x0128)));
+    assert_eq!((&got["no_such_output"], &got["no_such_input"]), (&json!(0x012A), &json!(0x012B)));
+    assert_eq!(got["multicast"], 0x0124);
+    assert_eq!((&got["open"], &got["second_owner"]), (&json!(0), &json!(0x0106)));
+
+    let number = |what: &str, field: &str| got[what][field].as_i64().expect("a number");
+    const TORQUE: i64 = 1 << 14;
+    assert_eq!(number("at_first", "status") & TORQUE, 0, "a level does not enable");
+    // 10 000 counts in a millimetre.
+    let arrived = number("arrived", "position");
+    assert!((arrived - 125_000).abs() <= 300, "{arrived}");
+    let velocity = number("under_way", "velocity");
+    assert!((velocity - 500_000).abs() < 50_000, "{velocity}");
+    assert_eq!(got["open_again"], 0);
+    let (again, still) = (number("again", "position"), number("still", "position"));
+    assert!(again > arrived && again < 7_000_000, "it stopped on its way: {again}");
+    assert_eq!(number("still", "status") & TORQUE, 0, "nothing moves on a reconnection");
+    assert!((still - again).abs() <= 10, "{still} {again}");
+    let lost = i64::from(profile_generic::fault::FaultCause::COMMAND_LOST.0);
+    assert_eq!((number("again", "fault"), number("still", "fault")), (lost, lost));
+    assert!(number("home", "position").abs() <= 300, "{}", got["home"]);
+    assert_eq!((number("off", "fault"), &got["close"]), (0, &json!(0)));
+
+    if peer::tshark_or_skip(TEST) {
+        let frames = tshark::dissect(&capture, "enip && udp.port == 2222", &[]);
+        assert!(frames.len() > 200, "{} frames", frames.len());
+        assert!(frames.iter().all(|frame| !frame.has("_ws.malformed")));
+        let in_run = tshark::dissect(&capture, "cip.32bitheader.run_idle == 1", &[]);
+        assert!(in_run.len() > 100, "{} frames with a run/idle header", in_run.len());
+        let opens = tshark::dissect(&capture, "cip.cm.otrpi && cip.rr == 0", &[]);
+        assert!(opens.len() >= 8, "{} requests", opens.len());
+    }
+}
+
+#[test]
+fn the_simulated_plc_moves_an_axis_through_assemblies_or_says_why_not() {
+    const ADDRESS: &str = "127.0.0.68";
+    const MOTION: &str = "127.0.0.67";
+    let example = with_assembly(include_str!("../../../examples/two-axes-in-process.toml"), ADDRESS);
+    let (mut running, capture) = start_box_of(&example, MOTION, "simulated-plc");
+    let config = capture.with_extension("toml");
+    let plc = |axis: &str, to: &str, velocity: &str| {
+        let mut command = Command::new(axisbridge());
+        command.args([
+            "simulate",
+            "plc",
+            "--interval-us",
+            "20000",
+            "--axis",
+            axis,
+            "--to",
+            to,
+            "--velocity",
+            velocity,
+        ]);
+        let output = command.arg("--config").arg(&config).output().expect("it starts");
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let (code, said, error) = plc("slide", "12.5", "50");
+    assert_eq!(code, Some(0), "{said}{error}");
+    let last = said.lines().last().expect("a line");
+    let place: f64 = last.strip_prefix("slide at ").expect("the position").parse().expect("a number");
+    assert!((place - 12.5).abs() < 0.05, "{said}");
+    let (code, said, error) = plc("slide", "-5.5", "50");
+    assert_eq!(code, Some(1), "{said}{error}");
+    assert!(error.contains("the axis refuses to move: beyond limit"), "{error}");
+    let (code, _, error) = plc("slide", "0", "1001");
+    assert!(code == Some(1) && error.contains("the axis refuses to move: too fast"), "{error}");
+    let (code, _, error) = plc("turntable", "1", "1");
+    assert_eq!(code, Some(2), "{error}");
+    assert!(error.contains("is on the CIP Motion device `front`; expected one with assemblies"), "{error}");
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+    let (code, _, error) = plc("slide", "1", "1");
+    assert!(code == Some(1) && error.contains("cannot connect"), "{error}");
 }
 
 #[test]

@@ -248,11 +248,6 @@ fn a_scan_over_a_cable_makes_a_configuration_that_runs() {
     in_real_time(name, || {
         let (gateway, drives) = (Namespace::new("box"), Namespace::new("drv"));
         cable((&gateway, "sercos0", None), (&drives, "sercos0", None));
-        let arguments =
-            ["simulate", "sercos-drive", "--interface", "sercos0", "--slaves", "3", "--address", "7"];
-        let mut line = in_namespace(&drives, &arguments);
-        line.args(["--linear", "8", "--seconds", "90"]).stderr(Stdio::inherit());
-        let mut line = Running::start("simulate sercos-drive", &mut line);
         let config = scratch(&format!("{name}.toml"));
         let path = config.to_str().expect("UTF-8");
         let output = |arguments: &[&str]| {
@@ -260,6 +255,19 @@ fn a_scan_over_a_cable_makes_a_configuration_that_runs() {
             let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
             (output.status.code(), text(&output.stdout), text(&output.stderr))
         };
+        // An older run of the test may have left one.
+        let _ = std::fs::remove_file(&config);
+        let init = ["init", "--interface", "sercos0", "--output", path];
+        let (status, printed, said) = output(&init);
+        assert_eq!((status, printed.as_str()), (Some(1), ""), "{said}");
+        let last = "no drive answers that a configuration could begin with: nothing is written";
+        assert!(said.trim_end().ends_with(last) && !config.exists(), "{said}");
+
+        let arguments =
+            ["simulate", "sercos-drive", "--interface", "sercos0", "--slaves", "3", "--address", "7"];
+        let mut line = in_namespace(&drives, &arguments);
+        line.args(["--linear", "8", "--seconds", "90"]).stderr(Stdio::inherit());
+        let mut line = Running::start("simulate sercos-drive", &mut line);
 
         let (status, found, said) = output(&["scan", "--interface", "sercos0"]);
         assert_eq!(status, Some(0), "{found}{said}");
@@ -272,8 +280,11 @@ fn a_scan_over_a_cable_makes_a_configuration_that_runs() {
         ] {
             assert!(found.lines().any(|there| there == line), "no {line:?} in {found}");
         }
-        std::fs::write(&config, &found).expect("the scratch folder can be written");
-        let starter = found;
+        let (status, printed, said) = output(&init);
+        assert_eq!(status, Some(0), "{printed}{said}");
+        assert!(printed.starts_with(&format!("{path}: 3 axes, ")), "{printed}");
+        let starter = std::fs::read_to_string(&config).expect("init writes the file");
+        assert_eq!(starter, found, "init writes what scan prints");
 
         // Where the axis ends no bus knows: its limits are asked for, each line to be edited is named, and nothing else.
         let marks =

@@ -131,9 +131,11 @@ fn described(description: &Value, answers: &[(&str, &Value)]) {
     for (name, answer) in answers {
         let mut schema = json!({ "$ref": format!("#/components/schemas/{name}") });
         schema["components"] = description["components"].clone();
-        let mut wrong = (*answer).clone();
+        let mut wrong: Value = (*answer).clone();
         wrong.as_object_mut().expect("an object").remove("status");
-        wrong.as_object_mut().expect("an object").remove("axes");
+        for required in ["axes", "faults", "events"] {
+            wrong.as_object_mut().expect("an object").remove(required);
+        }
         let (at, documents) =
             (path(&format!("http-{name}.json")), path(&format!("http-{name}-answers.json")));
         std::fs::write(&at, schema.to_string()).expect("the folder of the tests");
@@ -205,7 +207,24 @@ fn fault_of_a_drive_has_one_name_in_status_metrics_and_page_stream() {
             reply.contains(&format!(" fault={FAULT}")) && value(&reply, "position=").abs() < 1.0,
             "{reply}"
         );
-        described(&description, &[("Overview", &status), ("Look", &look)]);
+        let (_, list) = get(address, "/api/v1/faults?axis=turntable");
+        let list: Value = serde_json::from_str(&list).expect("JSON");
+        let causes: Vec<&Value> =
+            list["faults"].as_array().expect("a list").iter().map(|fault| &fault["cause"]).collect();
+        assert!(causes.contains(&&FAULT.into()), "{list}");
+        let (_, lines) = get(address, "/api/v1/log?axis=turntable&level=warn");
+        let lines: Value = serde_json::from_str(&lines).expect("JSON");
+        let texts: Vec<&str> = lines["events"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .filter_map(|event| event["text"].as_str())
+            .collect();
+        assert!(texts.iter().any(|text| text.starts_with(FAULT)), "{texts:?}");
+        described(
+            &description,
+            &[("Overview", &status), ("Look", &look), ("FaultList", &list), ("LogLines", &lines)],
+        );
 
         // The stream ends with the gateway.
         let ended = gateway.run.terminate(Duration::from_secs(30));
@@ -246,6 +265,8 @@ fn two_hundred_connections_leave_the_gateway_working() {
             "{refused:?}"
         );
         assert_eq!(get(address, "/readyz"), (200, "ready\n".to_owned()));
+        let lines = gateway.log().matches("HTTP connection refused: too many are open").count();
+        assert!((1..20).contains(&lines), "{lines} lines: {}", gateway.log());
         drop(held);
         let ended = gateway.run.terminate(Duration::from_secs(30));
         assert_eq!(ended.code(), Some(0), "{}", gateway.log());

@@ -3,8 +3,11 @@
 mod demo;
 mod doctor;
 mod ending;
+mod histories;
 mod http;
+mod init;
 mod local;
+mod package;
 mod param;
 mod reload;
 mod scripts;

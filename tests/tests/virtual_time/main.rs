@@ -1,5 +1,6 @@
 //! The whole chain in virtual time: controller, network, box, bus and drives.
 
+mod assembly;
 mod attributes;
 mod bench_controller;
 mod beside;
@@ -21,6 +22,7 @@ mod events;
 mod faults;
 mod fixed;
 mod fixed_connections;
+mod histories;
 mod hookup;
 mod hot_plug;
 mod indicators;
@@ -49,5 +51,6 @@ mod torque;
 mod trims;
 mod truths;
 mod two_masters;
+mod user_limits;
 mod vendor_parameters;
 mod ways_back;

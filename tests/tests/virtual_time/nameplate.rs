@@ -57,6 +57,17 @@ fn data_of_the_configuration_are_read_and_compared() {
         assert!((current - 9.9).abs() > 0.1, "{bus}: {current}");
         let said = "attribute 1327 cannot be set to 1.375: the configuration has 1.25";
         assert!(rig.told().contains(said), "{bus}: {}", rig.told());
+        // That is said once, and of nothing else.
+        let other = format!(
+            "attribute 1319: the nameplate in the configuration has 9.9, the drive {current}, which counts"
+        );
+        assert_eq!(rig.told().matches(&other).count(), 1, "{bus}: {}", rig.told());
+        let others = rig.told().matches("the nameplate in the configuration").count();
+        assert_eq!(
+            others,
+            if bus == "SERCOS" { 1 } else { 2 },
+            "{bus}: the rated torque of a CANopen drive too"
+        );
     }
 }
 
@@ -70,4 +81,64 @@ fn data_of_the_configuration_are_computed_with() {
     let (mut rig, client) = self::rig(BOX, NAMEPLATE);
     assert_eq!(client.ask(&mut rig, GET, 1, Some(RATED_TORQUE), &[]), (OK, 2.4_f32.to_le_bytes().to_vec()));
     assert_eq!(client.ask(&mut rig, GET, 1, Some(OUTPUT_POWER), &[]).0, OK);
+}
+
+/// Each kind of motor has data of its own: those are compared, and those of the others are given back or absent, as without a nameplate.
+#[test]
+fn motors_of_all_kinds_are_compared() {
+    const LINEAR: &str = "motor = { type = \"linear-permanent-magnet\", pole_pitch = 24.0, rated_speed = 2.5, max_speed = 5.0, inertia = 3.5, \
+                          rated_torque = 200.0, torque_constant = 60.5, voltage_constant = 35.0 }\nencoder = { startup = \"absolute\", \
+                          length = 1500.0 }\n";
+    const INDUCTION: &str = "motor = { type = \"rotary-induction\", rated_frequency = 50.0, flux_current = 1.25, stator_resistance = 2.25 }\n";
+    let real = |value: f32| value.to_le_bytes().to_vec();
+    let linear = [
+        (1315, vec![3]),
+        (1316, vec![1]),
+        (1334, real(0.024)),
+        (1335, real(2.5)),
+        (1336, real(3.5)),
+        (1337, real(5.0)),
+        (679, real(5.0)),
+        (1342, real(200.0)),
+        (1343, real(60.5)),
+        (1344, real(35.0)),
+        (1415, vec![1]),
+        (1419, real(1.5)),
+    ];
+    let induction =
+        [(1315, vec![2]), (1316, vec![0]), (1345, real(50.0)), (1346, real(1.25)), (1347, real(2.25))];
+    for (nameplate, values) in [(LINEAR, &linear[..]), (INDUCTION, &induction[..])] {
+        for (bus, configuration) in [("SERCOS", BOX), ("CANopen", include_str!("can.toml"))] {
+            let (mut rig, client) = rig(configuration, nameplate);
+            for (id, value) in values {
+                assert_eq!(client.ask(&mut rig, GET, 1, Some(*id), &[]), (OK, value.clone()), "{bus} {id}");
+                // Only read.
+                if *id == 679 {
+                    continue;
+                }
+                assert_eq!(client.ask(&mut rig, SET, 1, Some(*id), value).0, OK, "{bus} {id}");
+                let mut other = value.clone();
+                *other.last_mut().expect("a value") ^= 1;
+                let status = client.ask(&mut rig, SET, 1, Some(*id), &other).0;
+                assert_eq!(status, INVALID_VALUE, "{bus} {id} {other:02X?}");
+                assert_eq!(client.ask(&mut rig, GET, 1, Some(*id), &[]), (OK, value.clone()), "{bus} {id}");
+            }
+        }
+    }
+}
+
+/// What is fixed for an axis, whatever is configured.
+#[test]
+fn what_is_the_same_for_each_axis_is_compared() {
+    let (mut rig, client) = rig(BOX, "power_structure_axis_id = 77\n");
+    assert_eq!(client.ask(&mut rig, GET, 1, Some(725), &[]), (OK, 77_u32.to_le_bytes().to_vec()));
+    assert_eq!(client.ask(&mut rig, GET, 2, Some(725), &[]), (OK, vec![0; 4]), "not checked");
+    for (id, value) in [(43, 1), (614, 0), (750, 0)] {
+        assert_eq!(client.ask(&mut rig, GET, 1, Some(id), &[]), (OK, vec![value]), "{id}");
+        assert_eq!(client.ask(&mut rig, SET, 1, Some(id), &[value]).0, OK, "{id}");
+        assert_eq!(client.ask(&mut rig, SET, 1, Some(id), &[value ^ 1]).0, INVALID_VALUE, "{id}");
+    }
+    for id in [1400, 1401] {
+        assert_eq!(client.ask(&mut rig, GET, 1, Some(id), &[]), (OK, vec![0]), "{id}: no text");
+    }
 }

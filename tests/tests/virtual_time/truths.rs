@@ -34,10 +34,14 @@ const BUSES: [&str; 3] = ["SERCOS", "CiA 402", "DeviceNet"];
 const STOPPING_TORQUE: u16 = 611;
 
 /// Data of motor and power stage that the configuration has.
-const NAMEPLATE: &str = "motor = { rated_torque = 2.4, rated_current = 3.5, peak_current = 10.0, rated_speed = 3000.0, \
-                         max_speed = 6000.0, rated_voltage = 230.0, rated_power = 0.75, poles = 8, inertia = 0.00012, \
-                         resistance = 1.25, inductance = 0.008, max_winding_temperature = 130.0, overload_limit = 110.0 }\n\
-                         converter = { bus_voltage = 325.0, rated_current = 7.5 }\n";
+const NAMEPLATE: &str = "motor = { type = \"rotary-permanent-magnet\", rated_torque = 2.4, rated_current = 3.5, peak_current = 10.0, \
+                         rated_speed = 3000.0, max_speed = 6000.0, rated_voltage = 230.0, rated_power = 0.75, poles = 8, \
+                         inertia = 0.00012, resistance = 1.25, inductance = 0.008, max_winding_temperature = 130.0, \
+                         overload_limit = 110.0, torque_constant = 0.69, voltage_constant = 41.5, q_inductance = 0.009, \
+                         d_inductance = 0.007, thermal_time_constant = 600.0 }\n\
+                         converter = { bus_voltage = 325.0, rated_current = 7.5, rated_voltage = 230.0, rated_power = 1.5, \
+                         thermal_time_constant = 60.0, bus = \"standalone\", mains = \"high\", checks_enable_input = true }\n\
+                         encoder = { type = \"hiperface\", startup = \"absolute\", turns = 4096 }\n";
 
 /// Cycle Resolution and Cycle Interpolation of both encoders.
 const COUNTS_OF_ENCODERS: [u16; 4] = [1416, 1417, 1466, 1467];

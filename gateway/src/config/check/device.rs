@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use profile_cip::wire::motion::Format;
 use profile_generic::time::DurationNs;
 
-use super::{Problems, value};
+use super::{Problems, assembly, value};
 use crate::config::file::{DeviceTable, IdentityTable, UpdatePeriodTable};
 use crate::config::{Device, Identity, duration};
 use crate::finding::Spanned;
@@ -36,6 +36,7 @@ pub(super) fn check(problems: &mut Problems, table: &DeviceTable, cycle_time: Du
         0,
     );
     let connection_format = connection_format(problems, table);
+    let assembly = assembly::check(problems, table);
     let update_period = update_period(problems, table.update_period.as_ref(), cycle_time);
     let (update_period_min, update_period_max) = update_period?;
     Some(Device {
@@ -44,6 +45,7 @@ pub(super) fn check(problems: &mut Problems, table: &DeviceTable, cycle_time: Du
         identity: identity?,
         power_structure_class_id: power_structure_class_id?,
         connection_format: connection_format?,
+        assembly: assembly?,
         update_period_min,
         update_period_max,
     })

@@ -3,6 +3,7 @@
 //! One file for each subject: its function `check` takes the tables of that subject and returns what they come to, or reports what is
 //! wrong and returns `None`, so that the rest of the file is still checked.
 
+pub(super) mod assembly;
 pub(super) mod axis;
 pub(super) mod can;
 pub(super) mod can_device;
@@ -11,7 +12,7 @@ pub(super) mod devicenet;
 mod http;
 mod limits;
 pub(super) mod modbus;
-mod nameplate;
+pub(in crate::config) mod nameplate;
 mod problems;
 mod realtime;
 mod references;
@@ -63,6 +64,10 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
         value::path(problems, path, "the settings file");
     }
     let settings_file = settings_file.map(path);
+    let history_dir = file.history.as_ref().map(|table| {
+        value::path(problems, &table.directory, "the directory of the fault history");
+        path(&table.directory)
+    });
 
     let south = file.south.get_ref();
     let usual = RealtimeTable::default();
@@ -97,6 +102,7 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
         .map(|(axis, owner)| axis::check(problems, axis.get_ref(), *owner, &drives))
         .collect();
     references::instances(problems, &file.axis, &owners);
+    assembly::axes(problems, &file.device, &devices, &axes);
     let listen: Vec<_> = devices.iter().flatten().map(|device| device.listen).collect();
     let time = time::check(problems, file.time.as_ref(), &listen);
 
@@ -109,6 +115,7 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
         mappings_dir,
         overlays,
         settings_file,
+        history_dir,
         devices: devices.into_iter().collect::<Option<_>>()?,
         axes: axes.into_iter().collect::<Option<_>>()?,
         realtime: realtime?,

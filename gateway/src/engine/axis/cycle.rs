@@ -6,6 +6,7 @@ use super::guard::{Finding, Lead, way};
 use super::orders::ResetStep;
 use super::overtravel::Motion;
 use super::procedure::{ProcedureUnit, Surroundings};
+use super::slow_values::SlowValues;
 use super::start_stop::StartStop;
 use super::{AxisChannel, Loss, START_TIME_OUT, STOP_TIME_OUT};
 use crate::engine::cyclic::{Cycle, Received};
@@ -251,13 +252,15 @@ impl AxisChannel {
             error = Some(way).filter(|_| self.drive.action == Action::Enable);
         }
         let is_led = |axis: &Self| matches!(axis.state(), DriveState::Operating | DriveState::Testing);
-        let passed = self.supervision.passed_limits(&self.feedback, is_led(self), error);
+        let of_user = self.start_stop.settings.user_limits.speed;
+        let passed = self.supervision.passed_limits(&self.feedback, is_led(self), error, of_user);
         self.watch_conditions(now, system, &passed);
         let error = self.velocity_error();
         let torque = self.feedback.get(Signal::TorqueActual).filter(|_| is_led(self)).map(Torque);
         let tolerances = self.start_stop.settings.tolerances;
         let passed = self.supervision.tolerances.look(now, &tolerances, error, torque);
         self.watch_conditions(now, system, &passed);
+        self.watch_user_limits(now, system);
         let motion = |axis: &Self| Motion {
             led: is_led(axis),
             moves: moved || axis.may_move(),
@@ -273,6 +276,22 @@ impl AxisChannel {
         let checked = !homes && self.start_stop.settings.checks_overtravel;
         let passed = self.supervision.passed_switches(self.feedback.status, checked, &motion(self));
         self.watch_conditions(now, system, &passed);
+    }
+
+    /// What the controller wants watched beside that, of an axis that is led or not.
+    fn watch_user_limits(&mut self, now: MonotonicTime, system: SystemTime) {
+        let limits = self.start_stop.settings.user_limits;
+        let velocity = self.feedback.get(Signal::VelocityActual).map(Velocity);
+        let torque = self.feedback.get(Signal::TorqueActual).map(Torque);
+        let values = self.slow.at(now, |signal| self.feedback.get(signal));
+        if let Some(torque) = torque {
+            self.heats.sample(now, torque);
+        }
+        let charged = self.feedback.status.contains(StatusBits::POWER);
+        let passed = limits.passed(values, charged);
+        self.watch_conditions(now, system, &passed);
+        self.feedback.status.remove(StatusBits::THRESHOLDS);
+        self.feedback.status.insert(limits.thresholds(velocity, torque));
     }
 
     /// How much the velocity differs from the commanded one, which in position control is that of the commanded position; `None` while the
@@ -384,7 +403,8 @@ impl AxisChannel {
         self.link.disconnect();
         self.captures.restart();
         self.procedure.restart(&[]);
-        self.feedback.status.remove(ProcedureUnit::STATUS | StatusBits::INPUTS);
+        self.feedback.status.remove(ProcedureUnit::STATUS | StatusBits::INPUTS | StatusBits::THRESHOLDS);
+        self.slow = SlowValues::default();
     }
 
     // ---- faults ------------------------------------------------------------------------------------------------

@@ -33,6 +33,7 @@ mod faults;
 mod feed_forward;
 mod guard;
 mod handshake;
+mod heat;
 mod history;
 mod hookup;
 mod link;
@@ -45,12 +46,14 @@ mod ramp;
 mod reactions;
 pub mod rest;
 mod set_points;
+mod slow_values;
 mod start_stop;
 mod supervision;
 #[cfg(test)]
 mod tests;
 mod tolerance;
 mod trim;
+mod user_limits;
 mod velocimeter;
 mod waiting;
 
@@ -65,6 +68,7 @@ pub use self::reactions::Reactions;
 pub use self::set_points::{NorthPoints, Target, Updates};
 pub use self::start_stop::StopSettings;
 pub use self::tolerance::Tolerances;
+pub use self::user_limits::UserLimits;
 pub use self::waiting::{Awaited, Waiting};
 
 use crate::mapping::{Control, DriveProgram};
@@ -187,6 +191,10 @@ pub struct AxisChannel {
     rescaled: bool,
     /// What the configuration has of motor and power stage.
     data: Vec<(Parameter, i64)>,
+    /// What is known of the values of the drive that change slowly.
+    slow: slow_values::SlowValues,
+    /// How warm it is by its load.
+    heats: heat::Heats,
 }
 
 /// The generic state machine.
@@ -222,6 +230,8 @@ impl AxisChannel {
             procedure: ProcedureUnit::default(),
             rescaled: false,
             data: Vec::new(),
+            slow: slow_values::SlowValues::default(),
+            heats: heat::Heats::default(),
         }
     }
 
@@ -305,6 +315,9 @@ impl AxisChannel {
         match parameter {
             Parameter::SYSTEM_INERTIA => Some(inertia),
             Parameter::ACCELERATION_FEED_FORWARD_GAIN => Some(gain),
+            Parameter::MOTOR_USE => Some(self.heats.motor.millionths()),
+            Parameter::DRIVE_USE => Some(self.heats.drive.millionths()),
+            Parameter::HEARD_TIME => Some(self.supervision.heard_for().0),
             _ => None,
         }
     }
@@ -455,6 +468,12 @@ impl AxisChannel {
         self.data = data;
     }
 
+    /// The data that the configuration has of motor and power stage.
+    #[must_use]
+    pub fn data(&self) -> &[(Parameter, i64)] {
+        &self.data
+    }
+
     /// A number that is another one after the drive has got another program or is gone: what was made of [`Self::south`] may be kept
     /// as long as it is the same.
     #[must_use]
@@ -465,6 +484,9 @@ impl AxisChannel {
     /// The drive is commissioned and will be spoken to by this program.
     pub fn set_south(&mut self, mut program: DriveProgram) {
         program.set_data(&self.data);
+        let constant = |of| program.datum(of).map(DurationNs);
+        let constants = [Parameter::MOTOR_THERMAL_TIME, Parameter::DRIVE_THERMAL_TIME].map(constant);
+        self.heats.set_constants(constants);
         self.procedure.restart(program.procedures());
         self.link.connect(program);
         self.captures.restart();
@@ -511,6 +533,21 @@ impl AxisChannel {
     pub fn diagnostic_message_read(&mut self, item: Item, data: Option<&[u8]>) -> Option<DiagnosticMessage> {
         let items = self.south().map_or(0, |program| program.diagnosis().len());
         self.diagnosis.message.take(item, data, items, Shows::of(&self.feedback).any())
+    }
+
+    /// The value that should be read now, because a limit of it is watched: its place and what carries it.
+    pub(in crate::engine) fn wanted_slow_value(&self, now: MonotonicTime) -> Option<(usize, Item)> {
+        self.slow.wanted(now, &self.start_stop.settings.user_limits, self.south()?)
+    }
+
+    /// What was wanted is on its way.
+    pub(in crate::engine) fn slow_value_requested(&mut self, now: MonotonicTime, place: usize) {
+        self.slow.ask(now, place);
+    }
+
+    /// The drive has answered, or does not give it.
+    pub(in crate::engine) fn slow_value_read(&mut self, now: MonotonicTime, item: Item, data: Option<&[u8]>) {
+        self.slow.take(now, item, data, self.link.program());
     }
 
     // ---- tests, captures, procedures ---------------------------------------------------------------------------

@@ -22,7 +22,7 @@ use profile_generic::sequence::{
 use profile_generic::state::{Action, DriveState, Report};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use super::{FeedForward, Ramp, START_TIME_OUT, STOP_TIME_OUT, Tolerances};
+use super::{FeedForward, Ramp, START_TIME_OUT, STOP_TIME_OUT, Tolerances, UserLimits};
 
 /// How an axis is to start and stop, and what stops it, as controller and configuration have it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -41,6 +41,8 @@ pub struct StopSettings {
     pub checks_overtravel: bool,
     /// Limits that may be passed for a time.
     pub tolerances: Tolerances,
+    /// What is watched beside them.
+    pub user_limits: UserLimits,
     /// Time constant of the filter of an acceleration that the drive does not report; 0 is none (attribute 1435).
     pub acceleration_filter: DurationNs,
     /// Torque that is fed forward.

@@ -29,6 +29,8 @@ pub(super) struct Supervision {
     pub tolerances: ToleranceWatch,
     /// Since when the drive is not heard.
     silent_since: Option<MonotonicTime>,
+    /// Since when it is, and for how long by now.
+    heard: Option<(MonotonicTime, DurationNs)>,
     /// That is so long ago that the end of its stop is waited for no longer.
     unseen: bool,
 }
@@ -44,6 +46,7 @@ impl Supervision {
             software_limits: Overtravel::default(),
             tolerances: ToleranceWatch::default(),
             silent_since: None,
+            heard: None,
             unseen: false,
         }
     }
@@ -63,6 +66,13 @@ impl Supervision {
     /// Takes what the drive reports in this cycle.
     pub fn hear(&mut self, now: MonotonicTime, report: Report) {
         self.silent_since = (report == Report::Silent).then(|| self.silent_since.unwrap_or(now));
+        let since = self.heard.map_or(now, |(since, _)| since);
+        self.heard = (report != Report::Silent).then(|| (since, now.since(since)));
+    }
+
+    /// How long the drive has been heard without a break.
+    pub fn heard_for(&self) -> DurationNs {
+        self.heard.map(|(_, time)| time).unwrap_or_default()
     }
 
     /// Time passes.
@@ -105,23 +115,29 @@ impl Supervision {
         known.then(|| self.plausibility.judge(feedback.position, at, self.limits.velocity)).flatten()
     }
 
-    /// The limits of an axis that is `led`; `error` is its following error where that counts.
+    /// The limits of an axis that is `led`; `error` is its following error where that counts. The speed that the controller has set a
+    /// limit of counts also of an axis that is not led.
     pub fn passed_limits(
         &self,
         feedback: &AxisFeedback,
         led: bool,
         error: Option<Position>,
+        of_user: Option<Velocity>,
     ) -> Conditions<3> {
         let speed = feedback.velocity.get().unsigned_abs();
         let too_fast = |limit: Velocity| {
             let limit = limit.get().unsigned_abs();
             speed > limit.saturating_add(limit / 10)
         };
+        let beyond_user = |limit: Velocity| {
+            feedback.present.contains(FeedbackSet::VELOCITY) && speed > limit.get().unsigned_abs()
+        };
+        let too_fast = led && self.limits.velocity.is_some_and(too_fast) || of_user.is_some_and(beyond_user);
         let astray =
             |(error, limit): (Position, Position)| error.get().unsigned_abs() > limit.get().unsigned_abs();
         let homing_failed = feedback.status.contains(StatusBits::HOMING_FAILED);
         [
-            (FaultCause::MOTOR_OVER_SPEED_USER_LIMIT, led && self.limits.velocity.is_some_and(too_fast)),
+            (FaultCause::MOTOR_OVER_SPEED_USER_LIMIT, too_fast),
             (
                 FaultCause::EXCESSIVE_POSITION_ERROR,
                 led && error.zip(self.limits.following_error).is_some_and(astray),
@@ -206,20 +222,42 @@ mod tests {
             watch.tick(at(millis));
             assert_eq!(watch.is_unseen(), unseen, "{millis}");
         }
+        assert_eq!(watch.heard_for(), DurationNs::ZERO, "it is silent");
+        for millis in [3_000, 3_500, 5_250] {
+            watch.hear(at(millis), Report::Ready);
+        }
+        assert_eq!(watch.heard_for(), DurationNs::from_millis(2_250));
     }
 
     #[test]
     fn limits_count_while_the_axis_is_led() {
         let watch = supervision();
         let fast = AxisFeedback { velocity: Velocity(-11 * UNIT - 1), ..AxisFeedback::default() };
-        assert_eq!(there(watch.passed_limits(&fast, true, None)), [FaultCause::MOTOR_OVER_SPEED_USER_LIMIT]);
-        assert_eq!(there(watch.passed_limits(&fast, false, Some(Position(UNIT)))), []);
+        let passed = |feedback, led, error| there(watch.passed_limits(feedback, led, error, None));
+        assert_eq!(passed(&fast, true, None), [FaultCause::MOTOR_OVER_SPEED_USER_LIMIT]);
+        assert_eq!(passed(&fast, false, Some(Position(UNIT))), []);
         let even = AxisFeedback { velocity: Velocity(11 * UNIT), ..AxisFeedback::default() };
-        assert_eq!(there(watch.passed_limits(&even, true, Some(Position(UNIT / 10)))), []);
-        let astray = there(watch.passed_limits(&even, true, Some(Position(-UNIT / 10 - 1))));
+        assert_eq!(passed(&even, true, Some(Position(UNIT / 10))), []);
+        let astray = passed(&even, true, Some(Position(-UNIT / 10 - 1)));
         assert_eq!(astray, [FaultCause::EXCESSIVE_POSITION_ERROR]);
         let failed = AxisFeedback { status: StatusBits::HOMING_FAILED, ..AxisFeedback::default() };
-        assert_eq!(there(watch.passed_limits(&failed, true, None)), [FaultCause::HOMING]);
+        assert_eq!(passed(&failed, true, None), [FaultCause::HOMING]);
+    }
+
+    #[test]
+    fn the_speed_of_the_controller_counts_without_torque_too() {
+        let watch = supervision();
+        let slow = AxisFeedback {
+            velocity: Velocity(-3 * UNIT),
+            present: FeedbackSet::VELOCITY,
+            ..AxisFeedback::default()
+        };
+        let passed =
+            |feedback, limit| there(watch.passed_limits(feedback, false, None, Some(Velocity(limit))));
+        assert_eq!(passed(&slow, 3 * UNIT), []);
+        assert_eq!(passed(&slow, 3 * UNIT - 1), [FaultCause::MOTOR_OVER_SPEED_USER_LIMIT]);
+        let unknown = AxisFeedback { present: FeedbackSet::empty(), ..slow };
+        assert_eq!(passed(&unknown, 1), [], "the drive does not report it");
     }
 
     #[test]

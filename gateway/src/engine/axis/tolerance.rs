@@ -17,6 +17,10 @@ pub struct Tolerances {
     pub over_torque: Option<Torque>,
     /// How long it may be passed (attribute 509); without a time it is not watched.
     pub over_torque_time: Option<DurationNs>,
+    /// Undertorque Limit (attribute 510), of both directions.
+    pub under_torque: Option<Torque>,
+    /// How long the torque may be below it (attribute 511); without a time it is not watched.
+    pub under_torque_time: Option<DurationNs>,
 }
 
 /// Since when each of them is passed.
@@ -24,6 +28,7 @@ pub struct Tolerances {
 pub(super) struct ToleranceWatch {
     velocity_error: Option<MonotonicTime>,
     over_torque: Option<MonotonicTime>,
+    under_torque: Option<MonotonicTime>,
 }
 
 impl ToleranceWatch {
@@ -34,21 +39,28 @@ impl ToleranceWatch {
         tolerances: &Tolerances,
         error: Option<Velocity>,
         torque: Option<Torque>,
-    ) -> Conditions<2> {
-        let astray =
-            |limit: Velocity| error.is_some_and(|error| magnitude(error.get()) > magnitude(limit.get()));
+    ) -> Conditions<3> {
+        let astray = |limit: Velocity| {
+            error.is_some_and(|error| error.get().unsigned_abs() > limit.get().unsigned_abs())
+        };
         let astray = tolerances.velocity_error.is_some_and(astray);
-        let strained =
-            |limit: Torque| torque.is_some_and(|torque| magnitude(torque.get()) > magnitude(limit.get()));
+        let strained = |limit: Torque| {
+            torque.is_some_and(|torque| torque.get().unsigned_abs() > limit.get().unsigned_abs())
+        };
         let strained = tolerances.over_torque.is_some_and(strained);
+        let slack = |limit: Torque| {
+            torque.is_some_and(|torque| torque.get().unsigned_abs() < limit.get().unsigned_abs())
+        };
+        let slack = tolerances.under_torque.is_some_and(slack);
         let astray = lasts(&mut self.velocity_error, now, astray, Some(tolerances.velocity_error_time));
         let strained = lasts(&mut self.over_torque, now, strained, tolerances.over_torque_time);
-        [(FaultCause::EXCESSIVE_VELOCITY_ERROR, astray), (FaultCause::OVER_TORQUE, strained)]
+        let slack = lasts(&mut self.under_torque, now, slack, tolerances.under_torque_time);
+        [
+            (FaultCause::EXCESSIVE_VELOCITY_ERROR, astray),
+            (FaultCause::OVER_TORQUE, strained),
+            (FaultCause::UNDER_TORQUE, slack),
+        ]
     }
-}
-
-const fn magnitude(value: i64) -> u64 {
-    value.unsigned_abs()
 }
 
 /// Whether it has been so for longer than `time`; never without one.
@@ -78,30 +90,38 @@ mod tests {
             velocity_error_time: DurationNs::from_millis(20),
             over_torque: Some(Torque(500_000)),
             over_torque_time: Some(DurationNs::from_millis(5)),
+            under_torque: Some(Torque(100)),
+            under_torque_time: Some(DurationNs::from_millis(2)),
         };
         let mut watch = ToleranceWatch::default();
         let at = |millis| MonotonicTime(1) + DurationNs::from_millis(millis);
         for (millis, error, torque, expected) in [
-            (0, UNIT, 500_000, [false, false]),
-            (1, -UNIT - 1, 500_001, [false, false]),
-            (5, -UNIT - 1, -500_001, [false, false]),
-            (6, UNIT + 1, -500_001, [false, true]),
-            (20, UNIT + 1, 0, [false, false]),
-            (21, -UNIT - 1, 500_001, [true, false]),
-            (22, UNIT, 500_001, [false, false]),
-            (23, UNIT + 1, 500_001, [false, false]),
-            (43, UNIT + 1, 500_001, [true, true]),
+            (0, UNIT, 500_000, [false; 3]),
+            (1, -UNIT - 1, 500_001, [false; 3]),
+            (5, -UNIT - 1, -500_001, [false; 3]),
+            (6, UNIT + 1, -500_001, [false, true, false]),
+            (20, UNIT + 1, 0, [false; 3]),
+            (21, -UNIT - 1, 500_001, [true, false, false]),
+            (22, UNIT, 500_001, [false; 3]),
+            (23, UNIT + 1, 500_001, [false; 3]),
+            (43, UNIT + 1, 500_001, [true, true, false]),
+            (50, UNIT, 99, [false; 3]),
+            (51, UNIT, -99, [false; 3]),
+            (52, UNIT, 0, [false, false, true]),
+            (53, UNIT, -100, [false; 3]),
+            (54, UNIT, 99, [false; 3]),
         ] {
             let passed = watch.look(at(millis), &tolerances, Some(Velocity(error)), Some(Torque(torque)));
             assert_eq!(passed.map(|(_, is_there)| is_there), expected, "{millis} ms");
             assert_eq!(passed[0].0, FaultCause::EXCESSIVE_VELOCITY_ERROR);
             assert_eq!(passed[1].0, FaultCause::OVER_TORQUE);
+            assert_eq!(passed[2].0, FaultCause::UNDER_TORQUE);
         }
         // The axis is not controlled, or the drive does not report its torque: the time begins anew.
-        let passed = watch.look(at(44), &tolerances, None, None);
-        assert_eq!(passed.map(|(_, is_there)| is_there), [false, false]);
-        let passed = watch.look(at(45), &tolerances, Some(Velocity(9 * UNIT)), Some(Torque(900_000)));
-        assert_eq!(passed.map(|(_, is_there)| is_there), [false, false]);
+        let passed = watch.look(at(64), &tolerances, None, None);
+        assert_eq!(passed.map(|(_, is_there)| is_there), [false; 3]);
+        let passed = watch.look(at(65), &tolerances, Some(Velocity(9 * UNIT)), Some(Torque(900_000)));
+        assert_eq!(passed.map(|(_, is_there)| is_there), [false; 3]);
     }
 
     #[test]
@@ -111,13 +131,18 @@ mod tests {
             let error = Some(Velocity(i64::MIN));
             watch.look(MonotonicTime(at), tolerances, error, Some(Torque(i64::MIN))).map(|(_, there)| there)
         };
-        assert_eq!(look(&Tolerances::default(), 1), [false, false]);
+        assert_eq!(look(&Tolerances::default(), 1), [false; 3]);
         let tolerances = Tolerances {
             velocity_error: Some(Velocity(UNIT)),
             over_torque: Some(Torque(1)),
+            under_torque: Some(Torque(i64::MAX)),
             ..Tolerances::default()
         };
-        assert_eq!(look(&tolerances, 2), [true, false], "a velocity error without a time counts at once");
-        assert_eq!(look(&tolerances, 1_000_000_000), [true, false]);
+        assert_eq!(
+            look(&tolerances, 2),
+            [true, false, false],
+            "a velocity error without a time counts at once"
+        );
+        assert_eq!(look(&tolerances, 1_000_000_000), [true, false, false]);
     }
 }

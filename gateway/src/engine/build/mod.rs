@@ -10,11 +10,13 @@ use std::net::Ipv4Addr;
 use std::sync::Arc;
 
 use arrayvec::{ArrayString, ArrayVec};
+use profile_cip::assembly::Scale;
 use profile_cip::device::axis_object::AxisConfig;
 use profile_cip::device::axis_state::ControlKind;
 use profile_cip::device::config::{
     AdapterConfig, DEVICE_TYPE_CIP_MOTION_CONVERTER, DEVICE_TYPE_CIP_MOTION_DRIVE,
-    DEVICE_TYPE_CIP_MOTION_ENCODER, IdentityConfig, InterfaceConfig, LinkConfig, MotionConfig, QosConfig,
+    DEVICE_TYPE_CIP_MOTION_ENCODER, DEVICE_TYPE_GENERIC, IdentityConfig, InterfaceConfig, LinkConfig,
+    MotionConfig, QosConfig,
 };
 use profile_cip::device::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::device::motion_device::DeviceConfig;
@@ -24,9 +26,11 @@ use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::Velocity;
 use profile_generic::scaling::UnitKind;
+use profile_generic::sequence::{SequenceTimes, StopMethod, StopPlan};
 use profile_generic::time::DurationNs;
 
-use super::axis::{AxisChannel, HookupSettings, Limits};
+use super::assembly::{AssemblyAxis, AssemblyChannel};
+use super::axis::{AxisChannel, HookupSettings, Limits, StopSettings};
 use super::bus::can::failure::Misfit;
 use super::bus::{self, AnyBus, Buses};
 use super::device::{DeviceChannel, MemberConfig, StopDefaults};
@@ -140,6 +144,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
     let axes = config.axes.iter().map(|axis| channel(axis, &mapping)).collect::<Result<Vec<_>, _>>()?;
     let (axes, programs): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
     let mut devices = Vec::with_capacity(config.devices.len());
+    let mut assemblies = Vec::new();
     let mut adapters = Vec::with_capacity(config.devices.len());
     for (number, device) in config.devices.iter().enumerate() {
         let members = members(config, number);
@@ -152,6 +157,12 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         };
         let configs: Vec<_> = members.iter().map(member).collect();
         let number = u8::try_from(number).unwrap_or(u8::MAX);
+        if let Some(layout) = &device.assembly {
+            let axes: Vec<_> = members.iter().map(|(number, axis)| assembly_axis(*number, axis)).collect();
+            assemblies.push(AssemblyChannel::new(number, layout.clone(), device_end, &axes));
+            adapters.push((with_sheet(device, &members, host), adapter_end));
+            continue;
+        }
         let channel = DeviceChannel::new(
             number,
             device_config(device, &members, &mapping, config),
@@ -166,7 +177,9 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
     let (producer, notices) = rtrb::RingBuffer::new(NOTICES_MIN.max(config.axes.len() * NOTICES_OF_AXIS));
     let (publisher, status) = latest::latest(BoxStatus::STARTING);
     let lead = config.lead;
-    let engine = Engine::new(Parts { mapping, buses, devices, axes, notices: producer, publisher, lead });
+    let notices_in = producer;
+    let parts = Parts { mapping, buses, devices, assemblies, axes, notices: notices_in, publisher, lead };
+    let engine = Engine::new(parts);
     Ok(Built { engine, adapters, notices, status, commissioners })
 }
 
@@ -273,7 +286,9 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<(AxisChannel, CipProgram), 
     let moves = axis.function == AxisFunction::Drive;
     let mut channel = AxisChannel::new(limits, reaction(axis.on_command_loss), moves);
     channel.set_count(program.count());
-    channel.set_data(axis.nameplate.0.clone());
+    let mut data = axis.nameplate.0.clone();
+    data.push((Parameter::POWER_STRUCTURE_AXIS_ID, axis.power_structure_axis_id.into()));
+    channel.set_data(data);
     Ok((channel, program))
 }
 
@@ -293,6 +308,23 @@ fn stop_defaults(axis: &Axis) -> StopDefaults {
     };
     let zero_speed = axis.limits.velocity.map_or(usual, |limit| (limit.0 / 100).max(1));
     StopDefaults { zero_speed: Velocity(zero_speed), deceleration: axis.limits.acceleration }
+}
+
+/// An axis of a device with assemblies. A disable stops it on a ramp of its acceleration limit, or by the drive where it has
+/// none, and takes its torque away.
+fn assembly_axis(number: usize, axis: &Axis) -> AssemblyAxis {
+    let StopDefaults { zero_speed, deceleration } = stop_defaults(axis);
+    let method = if deceleration.is_some() { StopMethod::Ramp } else { StopMethod::Decelerate };
+    AssemblyAxis {
+        axis: number,
+        scale: Scale { counts_per_unit: axis.motion_resolution },
+        stops: StopSettings {
+            plan: StopPlan { method, hold: false },
+            times: SequenceTimes { zero_speed, ..SequenceTimes::default() },
+            deceleration,
+            ..StopSettings::default()
+        },
+    }
 }
 
 /// What a lost command makes of the configured stopping action.
@@ -393,7 +425,7 @@ fn without_sheet(device: &Device, members: &[(usize, &Axis)], host: Host) -> Ada
     AdapterConfig {
         identity: IdentityConfig {
             vendor: identity.vendor_id,
-            device_type: device_type(members),
+            device_type: if device.assembly.is_some() { DEVICE_TYPE_GENERIC } else { device_type(members) },
             product_code: identity.product_code,
             major: identity.revision_major,
             minor: identity.revision_minor,
@@ -423,6 +455,7 @@ fn without_sheet(device: &Device, members: &[(usize, &Axis)], host: Host) -> Ada
                 .map(|(_, axis)| axis.power_structure_axis_id)
                 .collect::<ArrayVec<_, 16>>(),
         },
+        assembly: device.assembly.clone(),
         eds: Arc::new([]),
         incarnation: host.incarnation,
     }

@@ -50,6 +50,8 @@ pub enum Purpose {
     },
     /// A setting of a drive that a cyclic list of a controller needs, with the index of the device of the axis.
     Setting(u8),
+    /// A value of a drive that the nameplate in the configuration says too, with the index of the device of the axis.
+    Nameplate(u8),
     /// Local control's access to a parameter, by its ticket.
     LocalParameter(u32),
     /// A register's access to a parameter, by its ticket.
@@ -58,6 +60,8 @@ pub enum Purpose {
     Diagnosis,
     /// The diagnostic message of the drive, for people.
     DiagnosticMessage,
+    /// A value that changes slowly and that a limit is watched by.
+    SlowValue,
     /// The drive's fault reset.
     FaultReset,
     /// Capturing events, with the generation of the axis's captures.
@@ -77,6 +81,16 @@ pub struct Answer {
     pub item: Item,
     /// The data read and the progress of a command, or why it failed.
     pub result: Result<(Data, Progress), AccessFailure>,
+}
+
+impl Answer {
+    /// The data read, or why they were not.
+    ///
+    /// # Errors
+    /// The access has failed.
+    pub fn data(&self) -> Result<&Data, AccessFailure> {
+        self.result.as_ref().map(|(data, _)| data).map_err(|failure| *failure)
+    }
 }
 
 /// The result of [`South::send`].
@@ -397,7 +411,7 @@ impl<T: Copy> Places<T> {
 }
 
 /// Starts the accesses that an axis wants outside the cyclic data: words with the cause of a fault or warning, fault reset,
-/// captures and procedures; one of each at a time.
+/// values that are watched, captures and procedures; one of each at a time.
 fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Access, Purpose) -> bool) {
     if axis.wants_drive_reset() {
         let sent = match axis.south().and_then(|program| program.command_of(Action::ResetFault)) {
@@ -418,6 +432,11 @@ fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Acces
         && access(&Access::read(item), Purpose::DiagnosticMessage)
     {
         axis.diagnostic_requested(now, item);
+    }
+    if let Some((place, item)) = axis.wanted_slow_value(now)
+        && access(&Access::read(item), Purpose::SlowValue)
+    {
+        axis.slow_value_requested(now, place);
     }
     if let Some((wanted, part, generation)) = axis.capture_access()
         && access(&wanted, Purpose::Capture(part, generation))

@@ -10,6 +10,7 @@ use profile_generic::time::MonotonicTime;
 
 use super::cyclic_values::CyclicValues;
 use super::encoder;
+use super::nameplate::NameplateCheck;
 use super::originals::Originals;
 use super::refusal::{parameter_refusal, refusal};
 use super::scaling::signal_octets;
@@ -43,6 +44,8 @@ pub(super) struct Accesses {
     originals: Originals,
     /// What the computed values of cyclic lists need.
     pub cyclic: CyclicValues,
+    /// Whether the drive is of the motor that the configuration says.
+    pub nameplate: NameplateCheck,
 }
 
 /// An access to a computed value.
@@ -89,7 +92,8 @@ impl Accesses {
             _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
         };
         let program = on.axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
-        if mapping.dictionaries.generic.computation(parameter).is_some() {
+        if mapping.dictionaries.generic.computation(parameter).is_some() && program.datum(parameter).is_none()
+        {
             return self.compute(access, &entry, parameter);
         }
         let Some(held) = program.parameter(parameter) else {
@@ -188,6 +192,8 @@ impl Accesses {
         self.give_back(on, buses);
         let purpose = Purpose::Setting(on.number);
         self.cyclic.advance(now, on.axis, |request| buses.access(axis_number, request, purpose));
+        self.nameplate
+            .advance(on.axis, |request| buses.access(axis_number, request, Purpose::Nameplate(number)));
         let original = on.original(false);
         let (device, tables) = (&mut *on.device, &mapping.cip);
         let originals = &mut self.originals;
@@ -245,7 +251,7 @@ impl Accesses {
 
     /// Takes the drive's answer to what it had, or takes back.
     pub fn original_answered(&mut self, answer: &Answer, write: bool, notice: &mut dyn FnMut(Notice)) {
-        let result = answer.result.as_ref().map(|(data, _)| data).map_err(|failure| *failure);
+        let result = answer.data();
         match (write, result) {
             (false, result) => self.originals.read(answer.item, result),
             (true, result) => {

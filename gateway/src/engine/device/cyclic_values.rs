@@ -119,6 +119,11 @@ impl CyclicValues {
         true
     }
 
+    /// Whether settings are still to be read that cyclic lists may need.
+    pub fn is_reading(&self) -> bool {
+        self.asked.is_some() || self.settings.iter().any(|setting| setting.due)
+    }
+
     /// A connection was opened: what was known is old.
     pub fn start_over(&mut self) {
         self.settings.iter_mut().for_each(|setting| (setting.value, setting.due) = (None, true));

@@ -5,6 +5,7 @@ mod axis;
 mod cyclic_values;
 mod encoder;
 mod member;
+mod nameplate;
 mod originals;
 mod reactions;
 mod refusal;
@@ -166,6 +167,12 @@ impl DeviceChannel {
     #[must_use]
     pub fn counters(&self) -> DatagramCounters {
         DatagramCounters { refused: self.admission.refused(), send_failures: self.send_failures }
+    }
+
+    /// Whether settings of the drives are still read that cyclic lists may need.
+    #[must_use]
+    pub fn is_reading(&self) -> bool {
+        self.members.iter().any(|member| member.accesses.cyclic.is_reading())
     }
 
     /// The engine's number of each axis with its state, in the order of the instances.
@@ -330,8 +337,10 @@ impl DeviceChannel {
         axes: &[AxisChannel],
         notice: &mut dyn FnMut(Notice),
     ) -> bool {
-        let (Purpose::Attribute { device, .. } | Purpose::Original { device, .. } | Purpose::Setting(device)) =
-            answer.purpose
+        let (Purpose::Attribute { device, .. }
+        | Purpose::Original { device, .. }
+        | Purpose::Setting(device)
+        | Purpose::Nameplate(device)) = answer.purpose
         else {
             return false;
         };
@@ -350,9 +359,9 @@ impl DeviceChannel {
             }
             Purpose::Original { write, .. } => member.accesses.original_answered(answer, write, notice),
             Purpose::Setting(_) => {
-                let result = answer.result.as_ref().map(|(data, _)| data).map_err(|failure| *failure);
-                member.accesses.cyclic.take(result, &axes[answer.axis]);
+                member.accesses.cyclic.take(answer.data(), &axes[answer.axis]);
             }
+            Purpose::Nameplate(_) => member.take_nameplate(answer.data(), axes, notice),
             _ => {}
         }
         true

@@ -12,7 +12,7 @@ use profile_generic::time::DurationNs;
 use super::access::{generic_of, held};
 use super::axis::CipAxis;
 use super::scaling::number_of;
-use crate::engine::axis::{AxisChannel, FeedForward, Ramp, StopSettings, Tolerances};
+use crate::engine::axis::{AxisChannel, FeedForward, Ramp, StopSettings, Tolerances, UserLimits};
 use crate::mapping::{AttributeEntry, AttributeTable, Backing, SequenceAttributes};
 
 /// What a stop falls back to where the controller has set nothing.
@@ -96,6 +96,7 @@ impl Settings<'_> {
             flying_start: raw(rows.flying_start) != 0 && by_velocity,
             checks_overtravel: raw(rows.overtravel_checking) != 0,
             tolerances: self.tolerances(),
+            user_limits: self.user_limits(),
             acceleration_filter: self
                 .attribute_of(Parameter::FEEDBACK_ACCELERATION_FILTER)
                 .and_then(|id| self.value(id))
@@ -120,7 +121,10 @@ impl Settings<'_> {
             stopping_limit,
             // Where it is not set the stopping time limit applies (attribute 617).
             coasting_limit: time(rows.coasting_time_limit).unwrap_or(stopping_limit),
-            zero_speed: self.value(rows.zero_speed).map_or(defaults.zero_speed, Velocity),
+            zero_speed: self
+                .of_rated_speed(Parameter::ZERO_SPEED)
+                .or_else(|| self.value(rows.zero_speed).map(Velocity))
+                .unwrap_or(defaults.zero_speed),
             zero_speed_time: time(rows.zero_speed_time).unwrap_or_default(),
         }
     }
@@ -146,12 +150,38 @@ impl Settings<'_> {
         Some(entries.find(is)?.id)
     }
 
-    /// Limits of velocity error and torque. A drive that has the parameter watches it itself.
+    /// What the controller has set of a parameter that the gateway goes by; `None` unless it is above 0. A drive that has the parameter
+    /// goes by it itself.
+    fn own(&self, parameter: Parameter) -> Option<i64> {
+        let id = self.attribute_of(parameter)?;
+        let is_ours = self.axis.south().is_some_and(|program| program.can_go_by(parameter));
+        if self.is_in_drive(id) || !is_ours { None } else { self.value(id) }
+    }
+
+    /// A part of the rated speed as a speed of the axis.
+    fn of_rated_speed(&self, parameter: Parameter) -> Option<Velocity> {
+        let rated = self.axis.south()?.rated_velocity()?;
+        part(self.own(parameter)?, rated.get()).map(Velocity)
+    }
+
+    /// What is watched beside the tolerances.
+    fn user_limits(&self) -> UserLimits {
+        let nominal = self.axis.south().and_then(|program| program.datum(Parameter::BUS_NOMINAL_VOLTAGE));
+        let of_nominal = |parameter| part(self.own(parameter)?, nominal?);
+        UserLimits {
+            speed: self.of_rated_speed(Parameter::OVER_SPEED_USER_LIMIT),
+            motor_temperature: self.own(Parameter::MOTOR_TEMPERATURE_USER_LIMIT),
+            drive_temperature: self.own(Parameter::DRIVE_TEMPERATURE_USER_LIMIT),
+            bus_high: of_nominal(Parameter::BUS_OVERVOLTAGE_USER_LIMIT),
+            bus_low: of_nominal(Parameter::BUS_UNDERVOLTAGE_USER_LIMIT),
+            velocity_threshold: self.own(Parameter::VELOCITY_THRESHOLD).map(Velocity),
+            torque_threshold: self.own(Parameter::TORQUE_THRESHOLD).map(Torque),
+        }
+    }
+
+    /// Limits of velocity error and torque.
     fn tolerances(&self) -> Tolerances {
-        let of = |parameter| {
-            let id = self.attribute_of(parameter)?;
-            if self.is_in_drive(id) { None } else { self.value(id) }
-        };
+        let of = |parameter| self.own(parameter);
         Tolerances {
             velocity_error: of(Parameter::VELOCITY_ERROR_TOLERANCE).map(Velocity),
             velocity_error_time: of(Parameter::VELOCITY_ERROR_TOLERANCE_TIME)
@@ -159,6 +189,8 @@ impl Settings<'_> {
                 .unwrap_or_default(),
             over_torque: of(Parameter::OVER_TORQUE_LIMIT).map(Torque),
             over_torque_time: of(Parameter::OVER_TORQUE_LIMIT_TIME).map(DurationNs),
+            under_torque: of(Parameter::UNDER_TORQUE_LIMIT).map(Torque),
+            under_torque_time: of(Parameter::UNDER_TORQUE_LIMIT_TIME).map(DurationNs),
         }
     }
 
@@ -180,4 +212,9 @@ impl Settings<'_> {
     fn is_in_drive(&self, id: u16) -> bool {
         held(self.attributes, self.axis, id).is_some()
     }
+}
+
+/// A part, in millionths, of a whole.
+fn part(millionths: i64, whole: i64) -> Option<i64> {
+    i64::try_from(i128::from(millionths) * i128::from(whole) / 1_000_000).ok()
 }

@@ -225,7 +225,60 @@ function showHealth(health, status) {
   document.title = `${status.name}: ${health.ready ? 'ready' : health.alive ? 'not ready' : 'not alive'}`;
 }
 
-function show({ health, status }) {
+const FAULTS_SHOWN = 20;
+const LINES_SHOWN = 30;
+const FAULT = ['Axis', 'Fault', 'Came', 'Ended', 'Controller', 'Drive', 'To do'];
+const LINE = ['Time', 'Level', 'About', 'Line'];
+
+const when = (time) => new Date(time).toLocaleString();
+
+function showFaults({ faults }) {
+  byId('no-faults').hidden = faults.length > 0;
+  byId('fault-table').hidden = faults.length === 0;
+  rows(byId('faults'), faults.slice(0, FAULTS_SHOWN), labels(FAULT, FAULT.length), (fault) => {
+    const code = fault.drive_code ? `0x${fault.drive_code.toString(16).toUpperCase().padStart(4, '0')}` : '';
+    return [
+      { text: fault.axis, more: [fault.bus, fault.drive].filter(Boolean).join(', ') },
+      { text: fault.cause, tone: fault.end ? '' : 'bad', more: fault.gateway || '' },
+      { text: when(fault.time) },
+      fault.end
+        ? { text: fault.end.time ? when(fault.end.time) : 'unknown', more: fault.end.by }
+        : { text: 'present', tone: 'bad' },
+      { text: fault.controller || '' },
+      { text: code, more: fault.drive_says || '' },
+      { text: fault.advice },
+    ];
+  });
+}
+
+function showLog({ events }) {
+  const tone = { error: 'bad', warn: 'warn' };
+  rows(byId('log'), [...events].reverse(), labels(LINE, LINE.length), (event) => [
+    { text: when(event.time) },
+    { text: event.level, tone: tone[event.level] || '' },
+    { text: event.axis || event.device || event.bus || event.kind },
+    { text: event.text },
+  ]);
+}
+
+// What was asked for last: a history is fetched when an event says that there is something new.
+const seen = { faults: null, log: null };
+
+async function fetchHistory(name, path, number, showIt) {
+  if (seen[name] === number) return;
+  const before = seen[name];
+  seen[name] = number;
+  try {
+    const answer = await fetch(path);
+    if (!answer.ok) throw new Error(answer.statusText);
+    showIt(await answer.json());
+  } catch {
+    // The next event tries again.
+    seen[name] = before;
+  }
+}
+
+function show({ health, status, history }) {
   setText(byId('name'), status.name);
   const connected = status.connections === 1 ? '1 controller' : `${status.connections} controllers`;
   // Whether it is ready stands below, with what is missing.
@@ -236,6 +289,8 @@ function show({ health, status }) {
   showAxes(status.axes);
   showTime(status.time);
   showCycles(status.cycles);
+  fetchHistory('faults', '/api/v1/faults', history.faults, showFaults);
+  fetchHistory('log', `/api/v1/log?lines=${LINES_SHOWN}`, history.log, showLog);
 }
 
 let source = null;
@@ -265,6 +320,8 @@ function connect() {
     else stale(`The gateway has stopped working: ${look.health.reason}.`);
   });
   source.addEventListener('error', () => {
+    // Another process counts anew.
+    seen.faults = seen.log = null;
     stale('No connection to the gateway; trying again.');
     // A browser gives up when it is answered with an error, such as too many viewers.
     if (source.readyState === EventSource.CLOSED) setTimeout(connect, RECONNECT_MS);

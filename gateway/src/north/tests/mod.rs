@@ -77,6 +77,7 @@ pub(crate) fn test_adapter_config(address: Ipv4Addr) -> AdapterConfig {
             power_structure_class_id: 0x0A0B_0C0D,
             power_structure_axis_ids: ArrayVec::from_iter([0x11]),
         },
+        assembly: None,
         eds: Arc::new([]),
         incarnation: 0x7A00,
     }

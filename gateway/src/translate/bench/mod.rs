@@ -63,6 +63,9 @@ const START: MonotonicTime = MonotonicTime(1_000_000_000);
 /// Update periods that an axis may take to get to where it is wanted.
 const PERIODS_MAX: i64 = 60;
 
+/// Update periods in which all settings of the drives of a device are read.
+const READS_PERIODS_MAX: i64 = 1_000;
+
 /// The same of the answer to an explicit message or a service: the drive may have to be asked.
 const ANSWER_PERIODS_MAX: i64 = 400;
 
@@ -504,6 +507,8 @@ impl Bench {
         if self.controllers[device].format == Format::Fixed {
             self.explicit(device, SET_ATTRIBUTE_SINGLE, 1, id::CONTROL_STATUS, &[1]);
         }
+        // The drives are asked for nothing else any more when the first line comes.
+        self.run_while(READS_PERIODS_MAX, |bench| bench.engine.devices()[device].is_reading());
     }
 
     fn lead_of(&self, cycle: DurationNs) -> DurationNs {

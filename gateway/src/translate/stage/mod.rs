@@ -151,6 +151,12 @@ pub enum StageError {
     /// The configuration makes no box.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// The axes of a device are not moved by CIP Motion.
+    #[error("the axes of the device {device} are moved through assemblies: expected CIP Motion devices only")]
+    Assembly {
+        /// The device.
+        device: String,
+    },
     /// A drive on CANopen cannot be led by its data sheet.
     #[error("axis {axis}: the drive of its data sheet cannot be used: {told}")]
     Sheet {
@@ -188,6 +194,9 @@ impl Stage {
 
     /// The same with drives that hold other values while the box asks them, and so get other telegrams.
     fn rehearse_holding(config: &Config, mapping: Mapping, held: Vec<Held>) -> Result<Self, StageError> {
+        if let Some(device) = config.devices.iter().find(|device| device.assembly.is_some()) {
+            return Err(StageError::Assembly { device: device.name.clone() });
+        }
         let mut bench = Bench::new(config, mapping.clone(), &held)?;
         let told: Vec<String> = bench.take_notices().iter().map(ToString::to_string).collect();
         let engine = bench.engine();

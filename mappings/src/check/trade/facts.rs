@@ -53,6 +53,16 @@ pub(super) const CIA402_SIGNS: &[(&str, Option<&str>)] = &[
     ("60B2:00", None),
 ];
 
+/// Values of parameters that 607Eh inverts, or does not: then the word is `none`.
+pub(super) const CIA402_PARAMETER_SIGNS: &[(&str, &str)] = &[
+    ("606B:00", CIA402_VELOCITY),
+    ("6074:00", "none"),
+    ("6077:00", "none"),
+    ("6078:00", "none"),
+    ("60E4:01", CIA402_POSITION),
+    ("60E5:01", CIA402_VELOCITY),
+];
+
 /// The bit of 607Eh that gives the axis its direction.
 pub(super) const CIA402_POSITION: &str = "Position polarity";
 const CIA402_VELOCITY: &str = "Velocity polarity";
@@ -147,12 +157,20 @@ pub(super) const PARAMETERS: &[Binding] = &[
     bound("homing_acceleration", &["S-0-0042"], &["609A:00"]),
     bound("home_position", &["S-0-0052"], &[]),
     bound("home_offset", &["S-0-0150"], &["607C:00"]),
+    bound("motor_temperature_limit", &["S-0-0204"], &[]),
+    bound("drive_temperature_limit", &["S-0-0203"], &[]),
+    bound("converter_current", &["S-0-0381"], &[]),
+    bound("converter_power", &["S-0-0382"], &[]),
+    bound("current_limit", &[], &["6073:00"]),
+    bound("operative_current_limit", &[], &["6073:00"]),
     bound("homed", &["S-0-0403"], &[]),
 ];
 
 /// Parameters that drives hold as a magnitude although the generic value is below zero.
-pub(super) const MAGNITUDES: &[(&str, &[&str])] =
-    &[("torque_limit_negative", &["S-0-0083", "S-0-0092", "60E1:00", "6072:00"])];
+pub(super) const MAGNITUDES: &[(&str, &[&str])] = &[
+    ("torque_limit_negative", &["S-0-0083", "S-0-0092", "60E1:00", "6072:00"]),
+    ("velocity_limit_negative", &["S-0-0091", "607F:00"]),
+];
 
 /// Words of which the other one means the opposite: a name with one is never bound to a name with the other.
 pub(super) const OPPOSITES: &[(&str, &str)] = &[
@@ -212,6 +230,13 @@ pub(super) const UNITS: &[(&str, f64)] = &[
     ("\u{b0}C", 1e3),
     ("mNm", 1e3),
     ("N*m", 1e6),
+    ("N*m/Amp (RMS)", 1e6),
+    ("N/Amp (RMS)", 1e6),
+    ("Volts (RMS) / KRPM", 1e6),
+    ("Volts (RMS) / (m/s)", 1e6),
+    ("Meters", 1e9),
+    ("ID#", 1.0),
+    ("% Nominal Bus Voltage", 1e4),
     ("N", 1e6),
     ("Hertz", 1e3),
     ("Ohms", 1e6),
@@ -669,6 +694,52 @@ pub(super) const ATTRIBUTES: &[(&str, &str)] = &[
     ("Rotary Motor Inertia", "motor_inertia"),
     ("Rotary Motor Rated Speed", "motor_rated_velocity"),
     ("Rotary Motor Max Speed", "motor_max_velocity"),
+    ("Velocity Threshold", "velocity_threshold"),
+    ("Operative Current Limit", "operative_current_limit"),
+    ("Current Vector Limit", "current_limit"),
+    ("Torque Threshold", "torque_threshold"),
+    ("Undertorque Limit", "under_torque_limit"),
+    ("Undertorque Limit Time", "under_torque_limit_time"),
+    ("Converter Output Current", "converter_current"),
+    ("Converter Output Power", "converter_power"),
+    ("Zero Speed", "zero_speed"),
+    ("Bus Configuration", "bus_configuration"),
+    ("Bus Voltage Select", "mains_class"),
+    ("Inverter Heatsink Temperature", "drive_temperature"),
+    ("Rotary Motor Overspeed Factory Limit", "motor_max_velocity"),
+    ("Linear Motor Overspeed Factory Limit", "motor_linear_max_velocity"),
+    ("Motor Overtemperature Factory Limit", "motor_temperature_limit"),
+    ("Inverter Overtemperature Factory Limit", "drive_temperature_limit"),
+    ("Motor Overspeed User Limit", "over_speed_user_limit"),
+    ("Motor Overtemperature User Limit", "motor_temperature_user_limit"),
+    ("Inverter Overtemperature User Limit", "drive_temperature_user_limit"),
+    ("Bus Overvoltage User Limit", "bus_overvoltage_user_limit"),
+    ("Bus Undervoltage User Limit", "bus_undervoltage_user_limit"),
+    ("Control Power-up Time", "up_time"),
+    ("Inverter Rated Output Voltage", "drive_rated_voltage"),
+    ("Inverter Rated Output Power", "drive_rated_power"),
+    ("Drive Power Structure Axis ID", "power_structure_axis_id"),
+    ("Drive Enable Input Checking", "enable_input_checking"),
+    ("Motor Type", "motor_type"),
+    ("Motor Unit", "motor_unit"),
+    ("Linear Motor Pole Pitch", "motor_pole_pitch"),
+    ("Linear Motor Rated Speed", "motor_linear_rated_velocity"),
+    ("Linear Motor Mass", "motor_mass"),
+    ("Linear Motor Max Speed", "motor_linear_max_velocity"),
+    ("PM Motor Torque Constant", "motor_torque_constant"),
+    ("PM Motor Rotary Voltage Constant", "motor_voltage_constant"),
+    ("PM Motor Rated Force", "motor_rated_force"),
+    ("PM Motor Force Constant", "motor_force_constant"),
+    ("PM Motor Linear Voltage Constant", "motor_linear_voltage_constant"),
+    ("Induction Motor Rated Frequency", "motor_rated_frequency"),
+    ("Induction Motor Flux Current", "motor_flux_current"),
+    ("Induction Motor Stator Resistance", "motor_stator_resistance"),
+    ("PM Motor Lq Inductance", "motor_q_inductance"),
+    ("PM Motor Ld Inductance", "motor_d_inductance"),
+    ("Feedback 1 Type", "encoder_type"),
+    ("Feedback 1 Startup Method", "encoder_startup"),
+    ("Feedback 1 Turns", "encoder_turns"),
+    ("Feedback 1 Length", "encoder_length"),
 ];
 
 /// Bits of S-0-0013 in the telegram, and what they show.
@@ -961,6 +1032,11 @@ pub(super) const FOUND_BY_BOX: &[&str] = &[
     "excessive_position_error",
     "excessive_velocity_error",
     "over_torque",
+    "under_torque",
+    "motor_over_temperature_user_limit",
+    "drive_over_temperature_user_limit",
+    "over_voltage_user_limit",
+    "under_voltage_user_limit",
     "hardware_overtravel_positive",
     "hardware_overtravel_negative",
     "software_overtravel_positive",
@@ -986,10 +1062,12 @@ pub(super) const IGNORABLE: &[&str] = &[
     "motor_over_temperature_user_limit",
     "motor_overload_user_limit",
     "drive_over_temperature_user_limit",
+    "over_voltage_user_limit",
     "under_voltage_user_limit",
     "excessive_position_error",
     "excessive_velocity_error",
     "over_torque",
+    "under_torque",
     "hardware_overtravel_positive",
     "hardware_overtravel_negative",
     "software_overtravel_positive",

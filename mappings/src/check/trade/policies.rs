@@ -18,11 +18,21 @@ const STORED_MAX: usize = 20;
 const STOPPING_TORQUE: &str = "stopping_torque";
 
 /// Parameters of attributes that the gateway watches an axis by where a drive has none, or computes with.
-const WATCHED: [&str; 10] = [
+const WATCHED: [&str; 20] = [
     "velocity_error_tolerance",
     "velocity_error_tolerance_time",
     "over_torque_limit",
     "over_torque_limit_time",
+    "under_torque_limit",
+    "under_torque_limit_time",
+    "velocity_threshold",
+    "torque_threshold",
+    "over_speed_user_limit",
+    "motor_temperature_user_limit",
+    "drive_temperature_user_limit",
+    "bus_overvoltage_user_limit",
+    "bus_undervoltage_user_limit",
+    "zero_speed",
     "feedback_acceleration_filter",
     "load_feedback_unit",
     "load_feedback_resolution",

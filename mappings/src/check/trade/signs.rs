@@ -1,6 +1,9 @@
 //! Every value that a drive can invert is inverted back by the same bit, in both directions.
 
-use super::facts::{CIA402_POSITION, CIA402_SIGNS, MAGNITUDES, SERCOS_DIRECTION, SERCOS_SIGNS, SercosSign};
+use super::facts::{
+    CIA402_PARAMETER_SIGNS, CIA402_POSITION, CIA402_SIGNS, MAGNITUDES, SERCOS_DIRECTION, SERCOS_SIGNS,
+    SercosSign,
+};
 use super::{Reporter, is_standard, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
@@ -103,6 +106,18 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     }
     for row in &file.rows.parameter {
         magnitude(&mut reporter, &row.parameter, &row.object, row.factor.as_ref());
+        let object = row.object.get_ref();
+        let fact = CIA402_PARAMETER_SIGNS.iter().find(|(known, _)| known == object);
+        let given = row.polarity.as_ref().map(|name| name.get_ref().as_str());
+        if let Some((_, expected)) = fact.filter(|(_, expected)| given != Some(*expected)) {
+            let what = [
+                format!("`{}` does not follow the polarity of the drive", row.parameter.get_ref()),
+                format!("expected `{expected}`: so is {object} inverted by 607Eh, or not"),
+                format!("write `polarity = \"{expected}\"`"),
+            ];
+            let place = place_of("polarity", row.polarity.as_ref(), ("parameter", &row.parameter));
+            reporter.report(WRONG_SIGN, place, what);
+        }
     }
 }
 

@@ -195,6 +195,7 @@ fn adapter(format: Format, io_port: u16) -> Adapter {
             power_structure_class_id: 0x0A0B_0C0D,
             power_structure_axis_ids: ArrayVec::new(),
         },
+        assembly: None,
         eds: std::sync::Arc::new([]),
         incarnation: 0x7A00,
     })

@@ -15,7 +15,7 @@ use core::net::{Ipv4Addr, SocketAddrV4};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::refusal::Refusal;
-use crate::device::motion_link::{ConnectionTriad, OpenParameters, Token};
+use crate::device::motion_link::{AssemblyRole, ConnectionTriad, OpenParameters, Token};
 use crate::device::session_slot::SessionSlot;
 use crate::wire::forward_open::{ForwardOpen, Trigger};
 use crate::wire::network_parameters::ConnectionType;
@@ -23,6 +23,9 @@ use crate::wire::status::ConnectionStatus;
 
 /// Most explicit connections at once: five controllers with six each, as ODVA recommends to expect.
 pub const EXPLICIT_CONNECTIONS_MAX: usize = 32;
+
+/// Most input-only and listen-only connections of a device with assemblies at once.
+pub const LISTENERS_MAX: usize = 8;
 
 /// Most connections at once: the motion connection and the explicit ones. Connection numbers are below it.
 pub const CONNECTIONS_MAX: u16 = 33;
@@ -118,6 +121,8 @@ pub(crate) struct ConnectionManager {
     pub motion: Motion,
     /// Whether the last motion connection has timed out, until the next one.
     pub motion_lost: bool,
+    /// Input-only and listen-only connections to assemblies; none of them is closed.
+    pub listeners: Vec<Motion>,
     pub explicit: Vec<Explicit>,
     next_id: u32,
     /// What connection IDs are drawn with; without it they count up.
@@ -128,7 +133,8 @@ impl ConnectionManager {
     pub fn new(incarnation: u16) -> Self {
         let next_id = u32::from(incarnation) << 16 | 1;
         let explicit = Vec::with_capacity(EXPLICIT_CONNECTIONS_MAX);
-        Self { motion: Motion::Closed, motion_lost: false, explicit, next_id, secret: None }
+        let listeners = Vec::with_capacity(LISTENERS_MAX);
+        Self { motion: Motion::Closed, motion_lost: false, listeners, explicit, next_id, secret: None }
     }
 
     /// Draws connection IDs with a secret from now on: nobody gets that of another's connection out of its own.
@@ -141,7 +147,7 @@ impl ConnectionManager {
         loop {
             let id = self.secret.map_or(self.next_id, |secret| drawn(self.next_id, secret));
             self.next_id = self.next_id.wrapping_add(1);
-            let motion = self.motion.parameters().is_some_and(|open| open.o_to_t_id == id);
+            let motion = self.all_io().any(|open| open.o_to_t_id == id);
             if id != 0 && !motion && self.explicit.iter().all(|one| one.o_to_t_id != id) {
                 return id;
             }
@@ -150,8 +156,37 @@ impl ConnectionManager {
 
     /// Whether a connection of this triad lives.
     pub fn has(&self, triad: ConnectionTriad) -> bool {
-        self.motion.parameters().is_some_and(|open| open.triad == triad)
-            || self.explicit.iter().any(|one| one.triad == triad)
+        self.all_io().any(|open| open.triad == triad) || self.explicit.iter().any(|one| one.triad == triad)
+    }
+
+    /// The motion connection, or that of the owner of assemblies, and those that listen.
+    fn all_io(&self) -> impl Iterator<Item = &OpenParameters> {
+        std::iter::once(&self.motion).chain(&self.listeners).filter_map(Motion::parameters)
+    }
+
+    /// Fails unless another connection to assemblies can be opened in this role.
+    pub fn check_assembly(&self, role: AssemblyRole) -> Result<(), Refusal> {
+        let opens = |one: &Motion| {
+            let assembly = one.parameters().and_then(|open| open.assembly);
+            assembly.is_some_and(|open| open.role != AssemblyRole::ListenOnly)
+        };
+        match role {
+            AssemblyRole::ExclusiveOwner => return self.check_owner(),
+            AssemblyRole::ListenOnly if !std::iter::once(&self.motion).chain(&self.listeners).any(opens) => {
+                return Err(Refusal::connection(ConnectionStatus::NON_LISTEN_ONLY_NOT_OPENED));
+            }
+            AssemblyRole::InputOnly | AssemblyRole::ListenOnly => {}
+        }
+        if self.listeners.len() >= LISTENERS_MAX {
+            return Err(Refusal::connection(ConnectionStatus::OUT_OF_CONNECTIONS));
+        }
+        Ok(())
+    }
+
+    /// The state of the connection to assemblies, or of the motion connection, of this triad.
+    pub fn io_of(&mut self, triad: ConnectionTriad) -> Option<&mut Motion> {
+        let of = |one: &&mut Motion| one.parameters().is_some_and(|open| open.triad == triad);
+        std::iter::once(&mut self.motion).chain(&mut self.listeners).find(of)
     }
 
     /// Fails unless the motion connection is free.
@@ -224,7 +259,8 @@ impl ConnectionManager {
 
     /// When the next connection, or the motion device's answer about one, times out.
     pub fn wake_at(&self) -> Option<MonotonicTime> {
-        self.explicit.iter().map(|one| one.deadline).chain(self.motion.deadline()).min()
+        let listeners = self.listeners.iter().filter_map(Motion::deadline);
+        self.explicit.iter().map(|one| one.deadline).chain(self.motion.deadline()).chain(listeners).min()
     }
 }
 

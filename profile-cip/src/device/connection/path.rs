@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::refusal::Refusal;
 use crate::device::config::{IdentityConfig, KeyMismatch};
-use crate::device::objects::class::{CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS};
+use crate::device::objects::class::{CLASS_ASSEMBLY, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS};
 use crate::wire::epath::{self, ElectronicKey, Encoding, LogicalType, Segment};
 use crate::wire::status::ConnectionStatus;
 
@@ -18,6 +18,19 @@ pub(crate) enum Application<'a> {
     MessageRouter,
     /// The Motion Device Axis Object class: the motion connection.
     Motion(MotionPath<'a>),
+    /// The Assembly Object class.
+    Assembly(AssemblyPath<'a>),
+}
+
+/// The path to a connection to assemblies.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct AssemblyPath<'a> {
+    /// The configuration assembly, where the path names one: the instance, or the first of three connection points.
+    pub configuration: Option<u32>,
+    /// Connection points of consumed and produced data.
+    pub points: ArrayVec<u16, POINTS_MAX>,
+    /// Configuration data.
+    pub data: Option<&'a [u8]>,
 }
 
 /// The path to the motion connection (Volume 9 clause 7-1.1).
@@ -69,6 +82,12 @@ pub(crate) fn application<'a>(path: &'a [u8], identity: &IdentityConfig) -> Resu
     // The connection points belong to the class, which instance 0 names as well.
     if class == u32::from(CLASS_MOTION_DEVICE_AXIS) && parts.instance.unwrap_or(0) == 0 {
         return Ok(Application::Motion(MotionPath { points: parts.points, data: parts.data }));
+    }
+    if class == u32::from(CLASS_ASSEMBLY) {
+        let Parts { instance, mut points, data, .. } = parts;
+        let first = if instance.is_none() && points.is_full() { points.pop_at(0) } else { None };
+        let configuration = instance.or(first.map(u32::from));
+        return Ok(Application::Assembly(AssemblyPath { configuration, points, data }));
     }
     Err(inconsistent)
 }

@@ -49,7 +49,7 @@ pub(crate) fn close(node: &mut Node, origin: &Origin, request: &Request<'_>) -> 
 }
 
 fn close_motion(node: &mut Node, origin: &Origin, triad: ConnectionTriad) -> Result<CloseParameters, Answer> {
-    let Motion::Open(owner) = node.connections.motion else {
+    let Some(&mut Motion::Open(owner)) = node.connections.io_of(triad) else {
         return Err(not_found(triad));
     };
     if owner.open.triad != triad || owner.peer.ip() != origin.peer.ip() {
@@ -60,7 +60,9 @@ fn close_motion(node: &mut Node, origin: &Origin, triad: ConnectionTriad) -> Res
         return Err(Answer { status, data: failure(triad, 0), ..Answer::default() });
     }
     let asked = Asked { token: close.token, deadline: origin.now + DEVICE_TIMEOUT };
-    node.connections.motion = Motion::Closing(owner, asked);
+    if let Some(state) = node.connections.io_of(triad) {
+        *state = Motion::Closing(owner, asked);
+    }
     Ok(close)
 }
 

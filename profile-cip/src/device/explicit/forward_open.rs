@@ -4,11 +4,14 @@ use core::net::SocketAddrV4;
 
 use super::adapter::DEVICE_TIMEOUT;
 use super::node::{Await, AwaitKind, Node, Origin, Step};
+use crate::assembly::Assemblies;
 use crate::device::connection::manager::{Asked, Motion, Owner, timeout_ns};
-use crate::device::connection::motion;
 use crate::device::connection::path::{self, Application};
 use crate::device::connection::refusal::Refusal;
-use crate::device::motion_link::{ConnectionTriad, MotionRequest, OpenParameters, OpenRefusal};
+use crate::device::connection::{assembly, motion};
+use crate::device::motion_link::{
+    AssemblyOpen, AssemblyRole, ConnectionTriad, MotionRequest, OpenParameters, OpenRefusal,
+};
 use crate::device::objects::object::{Answer, data_status};
 use crate::wire::encapsulation::IO_PORT;
 use crate::wire::forward_open::{CONNECTION_FAILURE_LEN, ConnectionFailure, ForwardOpen, ForwardOpenReply};
@@ -73,13 +76,37 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
             Ok(Opened::Now { o_to_t_id, t_to_o_id: open.t_to_o_id })
         }
         Application::Motion(path) => {
+            check_motion(node)?;
             let format_revision = motion::check_path(&path, &node.config.motion)?;
             motion::check_parameters(open, &node.config.motion)?;
             node.connections.check_owner()?;
             node.check_reset()?;
-            open_motion(node, origin, open, format_revision)
+            open_io(node, origin, open, (format_revision, None))
+        }
+        Application::Assembly(path) => {
+            let assemblies = assemblies(node)?;
+            let role = assembly::check_path(&path, assemblies)?;
+            assembly::check_parameters(open, role, assemblies, &node.config.motion)?;
+            node.connections.check_assembly(role)?;
+            node.check_reset()?;
+            let assembly = AssemblyOpen { role, t_to_o_rpi_us: open.t_to_o_rpi_us };
+            open_io(node, origin, open, (0, Some(assembly)))
         }
     }
+}
+
+/// A device with assemblies has no motion connection.
+fn check_motion(node: &Node) -> Result<(), Refusal> {
+    match node.config.assembly {
+        None => Ok(()),
+        Some(_) => Err(Refusal::connection(ConnectionStatus::INVALID_APPLICATION_PATH)),
+    }
+}
+
+/// The assemblies, where the device has some.
+fn assemblies(node: &Node) -> Result<&Assemblies, Refusal> {
+    let missing = || Refusal::connection(ConnectionStatus::INVALID_APPLICATION_PATH);
+    node.config.assembly.as_ref().ok_or_else(missing)
 }
 
 /// A Forward_Open without connection type in either direction opens nothing. It asks whether the path, the
@@ -91,8 +118,15 @@ fn null_open(
     open: &ForwardOpen<'_>,
     application: &Application<'_>,
 ) -> Result<Opened, Refusal> {
-    if let Application::Motion(path) = application {
-        motion::check_path(path, &node.config.motion)?;
+    match application {
+        Application::Motion(path) => {
+            check_motion(node)?;
+            motion::check_path(path, &node.config.motion)?;
+        }
+        Application::Assembly(path) => {
+            assembly::check_path(path, assemblies(node)?)?;
+        }
+        Application::MessageRouter => {}
     }
     let client = *origin.peer.ip();
     let motion = node.connections.motion.parameters();
@@ -105,11 +139,11 @@ fn null_open(
     Ok(Opened::Now { o_to_t_id, t_to_o_id })
 }
 
-fn open_motion(
+fn open_io(
     node: &mut Node,
     origin: &Origin,
     open: &ForwardOpen<'_>,
-    format_revision: u8,
+    (format_revision, assembly): (u8, Option<AssemblyOpen>),
 ) -> Result<Opened, Refusal> {
     // Point to point goes back to the peer itself, so of its socket address only the port counts. A group
     // address there is a mistake the originator has to hear of.
@@ -138,11 +172,18 @@ fn open_motion(
         t_to_o_variable: open.t_to_o.variable,
         t_to_o_dscp: node.qos_in_use.of_priority(open.t_to_o.priority),
         format_revision,
+        assembly,
     };
     node.ask(MotionRequest::Open(parameters)).map_err(|status| Refusal::new(status, 0))?;
     let owner = Owner { open: parameters, peer: origin.peer, multiplier: open.timeout_multiplier };
     let asked = Asked { token: parameters.token, deadline: origin.now + DEVICE_TIMEOUT };
-    node.connections.motion = Motion::Opening(owner, asked);
+    let opening = Motion::Opening(owner, asked);
+    match assembly {
+        Some(AssemblyOpen { role: AssemblyRole::InputOnly | AssemblyRole::ListenOnly, .. }) => {
+            node.connections.listeners.push(opening);
+        }
+        _ => node.connections.motion = opening,
+    }
     Ok(Opened::Asked(parameters))
 }
 
@@ -162,7 +203,7 @@ pub(crate) fn opened(
         t_to_o_id: open.t_to_o_id,
         triad: open.triad,
         o_to_t_api_us: open.rpi_us,
-        t_to_o_api_us: open.rpi_us,
+        t_to_o_api_us: open.assembly.map_or(open.rpi_us, |assembly| assembly.t_to_o_rpi_us),
         application_reply: &[],
     })
 }

@@ -16,7 +16,7 @@ use crate::device::connection::refusal::Refusal;
 use crate::device::counters::Counters;
 use crate::device::event::Event;
 use crate::device::motion_link::{
-    CloseParameters, ConnectionTriad, ExplicitRequest, MotionReply, MotionRequest, ObjectPath,
+    AssemblyOpen, CloseParameters, ConnectionTriad, ExplicitRequest, MotionReply, MotionRequest, ObjectPath,
     OpenParameters, Token,
 };
 use crate::device::objects::class::{
@@ -190,7 +190,9 @@ impl Node {
             return self.refuse(request.service, GeneralStatus::PRIVILEGE_VIOLATION);
         }
         let answer = match (path.class, path.instance, request.service) {
-            (CLASS_MOTION_DEVICE_AXIS, ..) => return self.hand_on(origin, &request, path),
+            (CLASS_MOTION_DEVICE_AXIS, ..) if self.config.assembly.is_none() => {
+                return self.hand_on(origin, &request, path);
+            }
             (CLASS_CONNECTION_MANAGER, 1, Service::FORWARD_OPEN | Service::LARGE_FORWARD_OPEN) => {
                 return forward_open::open(self, origin, &request);
             }
@@ -226,10 +228,16 @@ impl Node {
             CLASS_IDENTITY => serve(&mut self.identity(), service, path, data, limit),
             CLASS_MESSAGE_ROUTER => {
                 let explicit = u16::try_from(self.connections.explicit.len()).unwrap_or(u16::MAX);
-                let motion = u16::from(self.connections.motion.parameters().is_some());
+                let listeners = u16::try_from(self.connections.listeners.len()).unwrap_or(u16::MAX);
+                let motion = listeners + u16::from(self.connections.motion.parameters().is_some());
+                let has_axes = self.config.assembly.is_none();
                 let has_file = !self.config.eds.is_empty();
-                let mut router =
-                    MessageRouter { available: CONNECTIONS_MAX, active: explicit + motion, has_file };
+                let mut router = MessageRouter {
+                    available: CONNECTIONS_MAX,
+                    active: explicit + motion,
+                    has_file,
+                    has_axes,
+                };
                 serve(&mut router, service, path, data, limit)
             }
             CLASS_CONNECTION_MANAGER => {
@@ -298,6 +306,7 @@ impl Node {
     /// Takes note of what the motion device did, whether or not somebody still waits for it.
     pub fn note(&mut self, reply: &MotionReply) {
         self.note_reset(reply);
+        self.note_listener(reply);
         match (reply, self.connections.motion) {
             (MotionReply::Opened { token, outcome }, Motion::Opening(owner, asked))
                 if *token == asked.token =>
@@ -307,8 +316,7 @@ impl Node {
                 } else {
                     self.connections.motion = Motion::Open(owner);
                     self.connections.motion_lost = false;
-                    let OpenParameters { triad, rpi_us, .. } = owner.open;
-                    self.tell(Event::MotionOpened { triad, originator: owner.peer, rpi_us });
+                    self.tell(opened(&owner));
                 }
             }
             (MotionReply::Closed { token }, Motion::Closing(owner, asked)) if *token == asked.token => {
@@ -321,9 +329,7 @@ impl Node {
                 self.connections.motion = Motion::Closed;
                 self.connections.motion_lost = true;
                 self.counters.connection_timeouts += 1;
-                let OpenParameters { triad, timeout_us, .. } = owner.open;
-                let (originator, silent_us) = (owner.peer, *silent_us);
-                self.tell(Event::MotionLost { triad, originator, silent_us, timeout_us });
+                self.tell(lost(&owner, *silent_us));
             }
             _ => {}
         }
@@ -331,7 +337,56 @@ impl Node {
 
     fn motion_closed(&mut self, owner: &Owner) {
         self.connections.motion = Motion::Closed;
-        self.tell(Event::MotionClosed { triad: owner.open.triad });
+        self.tell(closed(owner));
+    }
+
+    /// As [`Self::note`], for input-only and listen-only connections.
+    fn note_listener(&mut self, reply: &MotionReply) {
+        let is_meant = |one: &Motion| match (reply, one) {
+            (MotionReply::Opened { token, .. }, Motion::Opening(_, asked))
+            | (MotionReply::Closed { token }, Motion::Closing(_, asked)) => *token == asked.token,
+            (
+                MotionReply::ConnectionLost { o_to_t_id, .. },
+                Motion::Open(owner) | Motion::Closing(owner, _),
+            ) => *o_to_t_id == owner.open.o_to_t_id,
+            _ => false,
+        };
+        let Some(place) = self.connections.listeners.iter().position(is_meant) else { return };
+        let (Motion::Opening(owner, _) | Motion::Open(owner) | Motion::Closing(owner, _)) =
+            self.connections.listeners[place]
+        else {
+            return;
+        };
+        match reply {
+            MotionReply::Opened { outcome: Ok(()), .. } => {
+                self.connections.listeners[place] = Motion::Open(owner);
+                self.tell(opened(&owner));
+                return;
+            }
+            MotionReply::ConnectionLost { silent_us, .. } => {
+                self.counters.connection_timeouts += 1;
+                self.tell(lost(&owner, *silent_us));
+            }
+            MotionReply::Closed { .. } => self.tell(closed(&owner)),
+            _ => {}
+        }
+        self.connections.listeners.swap_remove(place);
+    }
+
+    /// Stops waiting for the device to open or close input-only and listen-only connections.
+    fn listeners_silent(&mut self, now: MonotonicTime) {
+        let is_late = |one: &Motion| one.deadline().is_some_and(|deadline| deadline <= now);
+        while let Some(place) = self.connections.listeners.iter().position(is_late) {
+            match self.connections.listeners.swap_remove(place) {
+                Motion::Opening(owner, _) => {
+                    let OpenParameters { triad, o_to_t_id, .. } = owner.open;
+                    let token = self.new_token();
+                    let _ = self.ask(MotionRequest::Close(CloseParameters { token, triad, o_to_t_id }));
+                }
+                Motion::Closing(owner, _) => self.tell(closed(&owner)),
+                Motion::Closed | Motion::Open(_) => {}
+            }
+        }
     }
 
     /// Stops waiting for the motion device to open or close the connection. It finds requests in their order:
@@ -427,6 +482,7 @@ impl Node {
         if self.connections.motion.deadline().is_some_and(|deadline| deadline <= now) {
             self.motion_device_silent();
         }
+        self.listeners_silent(now);
         self.expire_reset(now);
         self.uploads.expire(now);
         while let Some(expired) = self.connections.take_expired(now) {
@@ -437,6 +493,39 @@ impl Node {
                 silent_us: micros(now - expired.heard),
                 timeout_us: micros(expired.deadline - expired.heard),
             });
+        }
+    }
+}
+
+/// That a connection was opened.
+fn opened(owner: &Owner) -> Event {
+    let OpenParameters { triad, rpi_us, assembly, .. } = owner.open;
+    let originator = owner.peer;
+    match assembly {
+        None => Event::MotionOpened { triad, originator, rpi_us },
+        Some(AssemblyOpen { role, t_to_o_rpi_us }) => {
+            Event::AssemblyOpened { role, triad, originator, intervals_us: (rpi_us, t_to_o_rpi_us) }
+        }
+    }
+}
+
+/// That a connection was closed.
+fn closed(owner: &Owner) -> Event {
+    let OpenParameters { triad, assembly, .. } = owner.open;
+    match assembly {
+        None => Event::MotionClosed { triad },
+        Some(AssemblyOpen { role, .. }) => Event::AssemblyClosed { role, triad },
+    }
+}
+
+/// That a connection has timed out.
+fn lost(owner: &Owner, silent_us: u64) -> Event {
+    let OpenParameters { triad, timeout_us, assembly, .. } = owner.open;
+    let originator = owner.peer;
+    match assembly {
+        None => Event::MotionLost { triad, originator, silent_us, timeout_us },
+        Some(AssemblyOpen { role, .. }) => {
+            Event::AssemblyLost { role, triad, originator, silent_us, timeout_us }
         }
     }
 }

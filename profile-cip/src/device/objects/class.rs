@@ -2,6 +2,8 @@
 
 /// Class code of the Message Router object.
 pub const CLASS_MESSAGE_ROUTER: u16 = 0x02;
+/// Class code of the Assembly object.
+pub const CLASS_ASSEMBLY: u16 = 0x04;
 /// Class code of the Connection Manager object.
 pub const CLASS_CONNECTION_MANAGER: u16 = 0x06;
 /// Class code of the Motion Device Axis Object.

@@ -372,6 +372,7 @@ impl MotionDrive {
             t_to_o_variable: false,
             t_to_o_dscp: 0,
             format_revision: FORMAT_REVISION,
+            assembly: None,
         };
         let reply = self.request(now, MotionRequest::Open(parameters));
         debug_assert!(matches!(reply, Some(MotionReply::Opened { outcome: Ok(()), .. })), "{reply:?}");

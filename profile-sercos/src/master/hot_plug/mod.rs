@@ -8,7 +8,7 @@
 //!
 //! On the other port, where there is one, hot plug is off meanwhile. So two slaves that were plugged in at both ends do
 //! not take what is meant for one of them. Two of them in a row at the same end both hear it: that is found out
-//! before the new slave gets any command value, see [`stage`].
+//! before the new slave gets any command value, see `stage.rs`.
 
 mod field;
 mod fit;

@@ -39,7 +39,7 @@ use profile_generic::time::DurationNs;
 use self::control::{Control, MODE_BLOCKS, ModeSwitch};
 use self::homing::Homing;
 use self::memory::Memory;
-use self::parameters::MODES;
+use self::parameters::{MODES, NEGATIVE_VELOCITY_LIMIT, POSITIVE_VELOCITY_LIMIT, VELOCITY_WINDOW};
 use self::probe::Probe;
 use self::scaling::Scales;
 use self::set_points::Path;
@@ -204,19 +204,23 @@ impl Drive {
     /// Limits and windows of the parameters, as the servo takes them.
     fn servo_parameters(&self, scales: &Scales, store: &Store, lag_less: bool) -> ServoParameters {
         let number = |idn| store.number_of(idn);
-        // Of several limits of the same value the tightest counts.
+        // Of several limits of the same value the tightest counts; that backward is negative.
+        let velocity_limit = number(Idn::BIPOLAR_VELOCITY_LIMIT)
+            .min(number(POSITIVE_VELOCITY_LIMIT))
+            .min(number(NEGATIVE_VELOCITY_LIMIT).saturating_neg());
         let least = |idns: [Idn; 3]| idns.into_iter().map(|idn| store.number_of(idn)).min().unwrap_or(1);
         let torque_limits =
             [Idn::BIPOLAR_TORQUE_LIMIT, Idn::POSITIVE_TORQUE_LIMIT, Idn::NEGATIVE_TORQUE_LIMIT];
         let acceleration_limits =
             [Idn::BIPOLAR_ACCELERATION_LIMIT, Idn::ACCELERATION_LIMIT, Idn::DECELERATION_LIMIT];
         ServoParameters {
-            velocity_limit: Velocity(scales.velocity.generic(number(Idn::BIPOLAR_VELOCITY_LIMIT)).max(1)),
+            velocity_limit: Velocity(scales.velocity.generic(velocity_limit).max(1)),
             torque_limit: Torque(scales.torque.generic(least(torque_limits)).max(1)),
             deceleration_limit: Acceleration(scales.acceleration.generic(least(acceleration_limits)).max(1)),
             position_error_tolerance: Position(scales.position.generic(number(Idn::MONITORING_WINDOW))),
             in_position_window: Position(scales.position.generic(number(Idn::POSITION_WINDOW)).max(1)),
             standstill_window: Velocity(scales.velocity.generic(number(Idn::STANDSTILL_WINDOW)).max(1)),
+            at_velocity_window: Velocity(scales.velocity.generic(number(VELOCITY_WINDOW)).max(1)),
             position_gain: number(Idn::POSITION_LOOP_KV).saturating_mul(1_000_000) / 6,
             // 0.01 %.
             velocity_feed_forward: if lag_less { number(Idn::VELOCITY_FEED_FORWARD_GAIN) * 100 } else { 0 },

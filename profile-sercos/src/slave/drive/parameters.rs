@@ -14,6 +14,21 @@ const FSP_DRIVE: i64 = 2;
 /// interpolation.
 pub const MODES: [u16; 6] = [0x0001, 0x0002, 0x0003, 0x000B, 0x0013, 0x001B];
 
+/// S-0-0038: positive velocity limit value.
+pub const POSITIVE_VELOCITY_LIMIT: Idn = Idn::standard(38);
+/// S-0-0039: negative velocity limit value.
+pub const NEGATIVE_VELOCITY_LIMIT: Idn = Idn::standard(39);
+/// S-0-0157: velocity window.
+pub const VELOCITY_WINDOW: Idn = Idn::standard(157);
+/// S-0-0203: amplifier shut-down temperature.
+pub const AMPLIFIER_SHUT_DOWN_TEMPERATURE: Idn = Idn::standard(203);
+/// S-0-0204: motor shut-down temperature.
+pub const MOTOR_SHUT_DOWN_TEMPERATURE: Idn = Idn::standard(204);
+/// S-0-0381: DC bus current.
+pub const DC_BUS_CURRENT: Idn = Idn::standard(381);
+/// S-0-0382: DC bus power.
+pub const DC_BUS_POWER: Idn = Idn::standard(382);
+
 /// Element 3: unsigned, signed or bits; written in CP2 and CP3, at any time, or never.
 mod attribute {
     pub const BITS: u32 = 0x7001_0001;
@@ -36,6 +51,8 @@ mod attribute {
     pub const FILTER: u32 = 0x0011_0001;
     pub const CURRENT_READ: u32 = 0x7312_0001;
     pub const SPEED_READ: u32 = 0x7412_0001;
+    pub const TEMPERATURE_READ: u32 = 0x7111_0001;
+    pub const POWER_READ: u32 = 0x7322_0001;
     pub const U16_READ: u32 = 0x7011_0001;
     pub const VOLTAGE_READ: u32 = 0x7011_0001;
     pub const MODE_LIST: u32 = 0x7035_0001;
@@ -163,6 +180,10 @@ fn define_values(store: &mut Store, servo: &ServoParameters) {
         value(Idn::DC_BUS_VOLTAGE, a::VOLTAGE_READ, "DC bus voltage", Feedback).unit("V"),
         value(Idn::MOTOR_TEMPERATURE, a::TORQUE_READ, "Motor temperature", Feedback).unit("degC"),
         value(Idn::AMPLIFIER_TEMPERATURE, a::TORQUE_READ, "Amplifier temperature", Feedback).unit("degC"),
+        value(MOTOR_SHUT_DOWN_TEMPERATURE, a::TEMPERATURE_READ, "Motor shut-down temperature", Feedback)
+            .unit("degC"),
+        value(DC_BUS_CURRENT, a::POWER_READ, "DC bus current", Feedback).unit("A"),
+        value(DC_BUS_POWER, a::POWER_READ, "DC bus power", Feedback).unit("kW"),
         value(Idn::POSITION_FEEDBACK_VALUE_STATUS, a::BITS, "Position feedback value status", Feedback),
         value(Idn::MANUFACTURER_CLASS_1_DIAGNOSTIC, a::BITS, "Manufacturer class 1 diagnostics", Feedback),
     ];
@@ -192,12 +213,21 @@ fn define_values(store: &mut Store, servo: &ServoParameters) {
     let peak = rated.saturating_mul(servo.torque_limit.0) / 1_000_000;
     // From nanounits a second to 0.0001 units a minute.
     let fastest = servo.rated_velocity.0.saturating_mul(6) / 10_000;
+    // The amplifier warms half as much as the motor, and is switched off with it.
+    let amplifier = (servo.max_temperature.0 + servo.ambient_temperature.0) / 200;
     let data = [
         Definition::value(Idn::standard(109), a::CURRENT_READ, "Motor peak current", peak).unit("A"),
         Definition::value(Idn::standard(110), a::CURRENT_READ, "Amplifier peak current", peak).unit("A"),
         Definition::value(Idn::standard(111), a::CURRENT_READ, "Motor continuous stall current", rated)
             .unit("A"),
         Definition::value(Idn::standard(112), a::CURRENT_READ, "Amplifier rated current", rated).unit("A"),
+        Definition::value(
+            AMPLIFIER_SHUT_DOWN_TEMPERATURE,
+            a::TEMPERATURE_READ,
+            "Amplifier shut-down temperature",
+            amplifier,
+        )
+        .unit("degC"),
         Definition::value(Idn::FSP_TYPE, a::U16_READ, "FSP type and version", FSP_DRIVE),
     ];
     for definition in data {
@@ -228,6 +258,9 @@ fn define_settings(store: &mut Store) {
         value(Idn::POSITION_WINDOW, a::POSITION, "Position window", 1).range(1, double),
         value(Idn::BIPOLAR_VELOCITY_LIMIT, a::VELOCITY_UNSIGNED, "Bipolar velocity limit value", 1)
             .range(1, double),
+        value(POSITIVE_VELOCITY_LIMIT, a::VELOCITY, "Positive velocity limit value", 1).range(1, double),
+        value(NEGATIVE_VELOCITY_LIMIT, a::VELOCITY, "Negative velocity limit value", -1).range(-double, -1),
+        value(VELOCITY_WINDOW, a::VELOCITY, "Velocity window", 1).range(1, double),
         value(Idn::BIPOLAR_TORQUE_LIMIT, a::TORQUE_UNSIGNED, "Bipolar torque/force limit value", 1)
             .range(1, word),
         value(Idn::POSITIVE_TORQUE_LIMIT, a::TORQUE_UNSIGNED, "Positive torque/force limit value", 1)
@@ -277,6 +310,9 @@ pub(super) fn preset(store: &mut Store, servo: &ServoParameters) {
     let Ok(scales) = Scales::read(store, servo) else { return };
     for (idn, value) in [
         (Idn::BIPOLAR_VELOCITY_LIMIT, scales.velocity.counts(servo.velocity_limit.0)),
+        (POSITIVE_VELOCITY_LIMIT, scales.velocity.counts(servo.velocity_limit.0)),
+        (NEGATIVE_VELOCITY_LIMIT, -scales.velocity.counts(servo.velocity_limit.0)),
+        (VELOCITY_WINDOW, scales.velocity.counts(servo.at_velocity_window.0)),
         (Idn::BIPOLAR_TORQUE_LIMIT, scales.torque.counts(servo.torque_limit.0)),
         (Idn::POSITIVE_TORQUE_LIMIT, scales.torque.counts(servo.torque_limit.0)),
         (Idn::NEGATIVE_TORQUE_LIMIT, scales.torque.counts(servo.torque_limit.0)),

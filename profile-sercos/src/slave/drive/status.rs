@@ -3,8 +3,10 @@
 use profile_generic::fault::FaultCause;
 use profile_generic::image::StatusBits;
 use profile_generic::quantity::Position;
+use profile_generic::scaling::UnitKind;
 use profile_generic::state::Report;
 
+use super::parameters::{DC_BUS_CURRENT, DC_BUS_POWER, MOTOR_SHUT_DOWN_TEMPERATURE};
 use super::{Drive, fault, scaling};
 use crate::slave::application::{Cycle, Diagnosis};
 use crate::slave::parameter::Store;
@@ -64,6 +66,11 @@ impl Drive {
         store.set_number_of(Idn::DC_BUS_VOLTAGE, actual.bus_voltage.0 / 1_000_000);
         let motor = scaling::temperature(store, actual.temperature.0);
         store.set_number_of(Idn::MOTOR_TEMPERATURE, motor);
+        let shut_down = self.servo.parameters().max_temperature.0;
+        store.set_number_of(MOTOR_SHUT_DOWN_TEMPERATURE, scaling::temperature(store, shut_down));
+        let (power, current) = self.bus_load();
+        store.set_number_of(DC_BUS_POWER, power);
+        store.set_number_of(DC_BUS_CURRENT, current);
         // The amplifier warms half as much as the motor; it is always in the unit of element 4.
         let ambient = self.servo.parameters().ambient_temperature;
         store.set_number_of(Idn::AMPLIFIER_TEMPERATURE, (actual.temperature.0 + ambient.0) / 200);
@@ -78,6 +85,21 @@ impl Drive {
             store.set_number_of(Idn::INTERFACE_STATUS, status | UNDEFINED_MODE);
         }
         store.set_number_of(Idn::DRIVE_STATUS, i64::from(self.status(cycle).bits()));
+    }
+
+    /// Power taken from the DC bus in W and its current in mA, without losses.
+    fn bus_load(&self) -> (i64, i64) {
+        let parameters = self.servo.parameters();
+        let torque = i128::from(self.actual.torque.0) * i128::from(parameters.rated_torque.0) / 1_000_000;
+        // Micro newton metres times nanoturns a second, or micro newtons times nanometres a thousand a second.
+        let (num, den) = match parameters.kind {
+            UnitKind::Rotary => (6_283_185, 1_000_000),
+            UnitKind::Linear => (1, 1_000),
+        };
+        let nanowatts = torque * i128::from(self.actual.velocity.0) / 1_000_000 * num / den;
+        let whole = |value: i128| i64::try_from(value).unwrap_or(i64::MAX);
+        let volts = i128::from(self.actual.bus_voltage.0 / 1_000_000).max(1);
+        (whole(nanowatts / 1_000_000_000), whole(nanowatts / 1_000_000 / volts))
     }
 
     /// Takes captured positions over as feedback values.

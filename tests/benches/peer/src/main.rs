@@ -176,6 +176,7 @@ fn adapter() -> Adapter {
             power_structure_class_id: 0,
             power_structure_axis_ids: ArrayVec::from_iter([0x11]),
         },
+        assembly: None,
         eds: Arc::new([]),
         incarnation: 1,
     })

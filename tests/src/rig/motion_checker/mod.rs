@@ -310,7 +310,13 @@ impl MotionChecker {
                 axis.curve.taken(now, id);
             }
         }
-        let leaders = rig.engine.axes().iter().map(leader).collect();
+        // What a controller commands through assemblies is not read here: its axes have no curve.
+        let by_assembly = |axis: usize| rig.engine.cip_program(axis).is_none();
+        let leaders = rig.engine.axes().iter().enumerate().map(|(number, axis)| match leader(axis) {
+            Leader::Controller if by_assembly(number) => Leader::Other,
+            leader => leader,
+        });
+        let leaders = leaders.collect();
         self.calls.push_back(Call { at: now, late, leaders });
         if self.calls.len() > CALLS_MAX {
             self.calls.pop_front();
@@ -331,7 +337,11 @@ impl MotionChecker {
         let correction = if corrects { CORRECTION } else { 0.0 };
         let offset = rig.controller_clock.offset(rig.now()) - rig.gateway_clock.offset(rig.now());
         let skew = Skew {
-            synchronous: rig.engine.devices()[0].device().is_synchronous(),
+            synchronous: rig
+                .engine
+                .devices()
+                .first()
+                .is_some_and(|channel| channel.device().is_synchronous()),
             // The time of another master is on its way to one of them: their stamps are compensated.
             offset: if corrects { DurationNs::ZERO } else { offset },
             drift: self.drifted.1 + correction,

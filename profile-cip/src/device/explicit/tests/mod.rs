@@ -1,5 +1,6 @@
 //! The adapter as its peers see it: bytes in, bytes out, in virtual time.
 
+mod assembly_connection;
 mod bad_input;
 mod explicit_connections;
 mod file_object;

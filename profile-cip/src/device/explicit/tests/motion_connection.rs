@@ -56,6 +56,7 @@ fn the_device_gets_what_was_asked_and_the_originator_what_was_given() {
             t_to_o_variable: true,
             t_to_o_dscp: 55,
             format_revision: 2,
+            assembly: None,
         }
     );
     let (answer, items) = rig.unconnected_reply(client);

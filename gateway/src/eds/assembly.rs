@@ -1,0 +1,131 @@
+//! The assemblies of a sheet, and the connections to them.
+
+use profile_cip::assembly::layout::{CONFIGURATION_POINT, INPUT_ONLY_POINT, LISTEN_ONLY_POINT};
+use profile_cip::assembly::{Assemblies, RUN_IDLE_LEN};
+use profile_cip::device::config::AdapterConfig;
+use profile_cip::device::objects::class::CLASS_ASSEMBLY;
+
+use super::writer::{Field, Writer};
+use super::{PARAM_RPI, parameters, transport};
+
+/// Bits of the first word of a connection beside those of every sheet.
+mod application {
+    pub const CLASS_1: u32 = 1 << 1;
+    pub const LISTEN_ONLY: u32 = 1 << 24;
+    pub const INPUT_ONLY: u32 = 1 << 25;
+}
+
+/// Bits of the second word: real time formats O->T.
+mod format {
+    pub const RUN_IDLE_HEADER: u32 = 4 << 8;
+    pub const HEARTBEAT: u32 = 3 << 8;
+}
+
+/// Bit of point to point in a field of connection types.
+const POINT_TO_POINT: u32 = 2;
+
+fn point(number: u16) -> String {
+    format!("Assem{number}")
+}
+
+/// A logical path segment of 8 or 16 bits.
+fn segment(kind: u8, number: u16) -> String {
+    let [low, high] = number.to_le_bytes();
+    match high {
+        0 => format!("{kind:02X} {low:02X}"),
+        _ => format!("{:02X} 00 {low:02X} {high:02X}", kind + 1),
+    }
+}
+
+/// The section with the assemblies.
+pub(super) fn section(w: &mut Writer, adapter: &AdapterConfig) {
+    let Some(assemblies) = &adapter.assembly else { return };
+    w.section("Assembly");
+    w.entry("Object_Name", &[Field::Text("Assembly Object")]);
+    w.entry("Object_Class_Code", &[Field::Hex(u32::from(CLASS_ASSEMBLY), 2)]);
+    let size = |len: usize| Field::Number(u32::try_from(len).unwrap_or(0));
+    for (number, name, len) in [
+        (assemblies.output_point(), "Output", assemblies.output_len()),
+        (assemblies.input_point(), "Input", assemblies.input_len()),
+        (CONFIGURATION_POINT, "Configuration", 0),
+        (INPUT_ONLY_POINT, "Heartbeat of input only", 0),
+        (LISTEN_ONLY_POINT, "Heartbeat of listen only", 0),
+    ] {
+        let path = format!("20 04 {}", segment(0x24, number));
+        w.entry(
+            &point(number),
+            &[Field::Text(name), Field::Text(&path), size(len), Field::Hex(0, 4), Field::Empty, Field::Empty],
+        );
+    }
+}
+
+/// The connections to the assemblies.
+pub(super) fn connections(w: &mut Writer, assemblies: &Assemblies) {
+    let types = 1 << (parameters::O_TO_T_TYPES + POINT_TO_POINT)
+        | 1 << (parameters::T_TO_O_TYPES + POINT_TO_POINT)
+        | parameters::O_TO_T_FIXED
+        | parameters::T_TO_O_FIXED
+        | parameters::O_TO_T_SCHEDULED
+        | parameters::T_TO_O_SCHEDULED;
+    let len = |len: usize| Field::Number(u32::try_from(len).unwrap_or(0));
+    let input = point(assemblies.input_point());
+    for (number, name, help, application, format, consumed, size) in [
+        (
+            1,
+            "Exclusive Owner",
+            "Moves the axes of the device",
+            transport::EXCLUSIVE_OWNER,
+            format::RUN_IDLE_HEADER,
+            assemblies.output_point(),
+            assemblies.output_len(),
+        ),
+        (
+            2,
+            "Input Only",
+            "Reads the axes of the device",
+            application::INPUT_ONLY,
+            format::HEARTBEAT,
+            INPUT_ONLY_POINT,
+            0,
+        ),
+        (
+            3,
+            "Listen Only",
+            "Reads the axes of the device while somebody else is connected",
+            application::LISTEN_ONLY,
+            format::HEARTBEAT,
+            LISTEN_ONLY_POINT,
+            0,
+        ),
+    ] {
+        let path = [
+            "20 04".to_owned(),
+            segment(0x24, CONFIGURATION_POINT),
+            segment(0x2C, consumed),
+            segment(0x2C, assemblies.input_point()),
+        ];
+        let output = point(consumed);
+        w.entry(
+            &format!("Connection{number}"),
+            &[
+                Field::Hex(application::CLASS_1 | transport::CYCLIC | application, 8),
+                Field::Hex(types | format, 8),
+                Field::Reference(PARAM_RPI),
+                len(size),
+                Field::Word(&output),
+                Field::Reference(PARAM_RPI),
+                len(assemblies.input_len()),
+                Field::Word(&input),
+                Field::Empty,
+                Field::Empty,
+                len(0),
+                Field::Word("Assem151"),
+                Field::Text(name),
+                Field::Text(help),
+                Field::Text(&path.join(" ")),
+            ],
+        );
+    }
+}
+
+const _: () = assert!(RUN_IDLE_LEN == 4 && CONFIGURATION_POINT == 151);

@@ -1,0 +1,602 @@
+//! One axis of a device with assemblies: what its control word makes of it, and where its set-points come from.
+//!
+//! ```text
+//! mode  name             set-points                                     START
+//! 1     position         the generator of the gateway, to the target    begins a movement
+//! 2     velocity         the generator of the gateway, to the velocity  not needed
+//! 3     cyclic position  each datagram                                  not needed
+//! 4     cyclic velocity  each datagram                                  not needed
+//! 5     cyclic torque    each datagram                                  not needed
+//! ```
+//!
+//! STOP brakes with the generator. In torque control, and where no acceleration is configured, it ends as a disable does. Another mode is
+//! taken at standstill; before, the axis brakes.
+
+use profile_cip::assembly::handshake::{Axis, Control, Handshake, Reaction, State, Status};
+use profile_cip::assembly::{AxisInput, AxisOutput, Link, Refusal, Scale};
+use profile_generic::fault::FaultCause;
+use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet, StatusBits};
+use profile_generic::inhibit::Inhibits;
+use profile_generic::interpolation::TargetUpdate;
+use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
+use profile_generic::quantity::{Acceleration, Position, Velocity};
+use profile_generic::sequence::SequenceStep;
+use profile_generic::state::{DriveState, Request};
+use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
+use profile_generic::time_base::TimeBase;
+
+use super::AssemblyAxis;
+use super::generator::{Generator, POSITION, VELOCITY};
+use crate::engine::axis::{
+    AxisChannel, Intent, NorthPoints, Owner, START_TIME_OUT, StopSettings, Target, Updates, Wish,
+};
+use crate::engine::local::UPDATE_PERIOD;
+
+/// How long an enable waits for the drive to become ready.
+const READY_TIME_OUT: DurationNs = DurationNs::from_secs(2);
+
+/// How long an axis has to be slower than its standstill speed at its target.
+const REST_TIME: DurationNs = DurationNs::from_millis(20);
+
+/// Largest distance from the target at which a movement is done: a hundredth of a unit, or this part of the following error
+/// limit if that is more.
+const IN_POSITION: i64 = 10_000_000;
+const IN_POSITION_DIVISOR: i64 = 20;
+
+/// How set-points of the generator are handed to the axis.
+const GENERATED: Updates = Updates { period: UPDATE_PERIOD, may_miss: 4, first: TargetUpdate::Interpolate };
+
+/// Set-points of the controller that may be missed before the command counts as lost.
+const MAY_MISS: u32 = 4;
+
+mod mode {
+    pub const POSITION: u8 = 1;
+    pub const VELOCITY: u8 = 2;
+    pub const CYCLIC_POSITION: u8 = 3;
+    pub const CYCLIC_VELOCITY: u8 = 4;
+    pub const CYCLIC_TORQUE: u8 = 5;
+}
+
+/// What is around an axis in a cycle.
+#[derive(Clone, Copy)]
+pub(super) struct Around<'a> {
+    pub now: (MonotonicTime, SystemTime),
+    pub time: &'a TimeBase,
+    pub synchronized: bool,
+    pub link: Link,
+    /// Interval of the owner.
+    pub period: Option<DurationNs>,
+    /// New data came, and would have on an even network at this instant.
+    pub paced_at: Option<MonotonicTime>,
+}
+
+/// Where the set-points of an operating axis come from.
+#[derive(Debug, Clone, Copy)]
+enum Source {
+    /// Nowhere yet: it holds the position at which it was enabled.
+    None,
+    /// The generator of the gateway.
+    Generator(Generator),
+    /// The controller.
+    Cyclic,
+}
+
+/// One axis.
+#[derive(Debug)]
+pub(super) struct PlcAxis {
+    /// Number of the axis in the engine.
+    pub number: usize,
+    pub scale: Scale,
+    stops: StopSettings,
+    handshake: Handshake,
+    source: Source,
+    /// The mode in use.
+    mode: u8,
+    /// Velocity and acceleration that mode 2 follows.
+    followed: Option<(Velocity, Acceleration)>,
+    /// Target of the last movement, until another order.
+    target: Option<Position>,
+    done: bool,
+    start_taken: bool,
+    refusal: Refusal,
+    sequence: u32,
+    /// Since when ENABLE waits for the drive.
+    enabling: Option<MonotonicTime>,
+    /// When the drive was asked to enable.
+    begun: Option<MonotonicTime>,
+    /// It was in operation since it was enabled.
+    has_operated: bool,
+    slow_since: Option<MonotonicTime>,
+    connected: bool,
+    toggle: bool,
+    sampled_at: MonotonicTime,
+}
+
+impl PlcAxis {
+    pub fn new(config: &AssemblyAxis) -> Self {
+        Self {
+            number: config.axis,
+            scale: config.scale,
+            stops: config.stops,
+            handshake: Handshake::default(),
+            source: Source::None,
+            mode: 0,
+            followed: None,
+            target: None,
+            done: false,
+            start_taken: false,
+            refusal: Refusal::NONE,
+            sequence: 0,
+            enabling: None,
+            begun: None,
+            has_operated: false,
+            slow_since: None,
+            connected: false,
+            toggle: false,
+            sampled_at: MonotonicTime::ZERO,
+        }
+    }
+
+    /// Does what the controller wants. Call it in every cycle.
+    pub fn follow(&mut self, around: &Around<'_>, axis: &mut AxisChannel, output: &AxisOutput) {
+        let (now, system) = around.now;
+        if axis.owner() == Owner::Local {
+            self.handshake = Handshake::default();
+            return;
+        }
+        self.connect(axis);
+        let mut inhibits = Inhibits::empty();
+        inhibits.set(Inhibits::LIMIT_SWITCHES_NOT_TOLD, axis.misses_limit_switches());
+        axis.set_inhibits(now, system, inhibits);
+        axis.retry_wish(now, system);
+        self.slow_since = axis.stands().then(|| self.slow_since.unwrap_or(now));
+        if !is_operating(axis) {
+            (self.source, self.followed) = (Source::None, None);
+        }
+        let known = Axis { faulted: is_faulted(axis), operating: is_operating(axis) };
+        let before = self.handshake.state();
+        let (reaction, refusal) = self.handshake.step(around.link, output.control, known);
+        if before == State::Enabled && known.faulted {
+            self.forget_enable();
+        }
+        if !output.control.contains(Control::START) {
+            self.start_taken = false;
+        }
+        if refusal != Refusal::NONE {
+            self.refusal = refusal;
+        }
+        if reaction.contains(Reaction::LOSE) {
+            self.lose(around, axis);
+        }
+        if reaction.contains(Reaction::DISABLE) {
+            self.disable(around, axis);
+        }
+        if reaction.contains(Reaction::RESET) {
+            self.refusal = Refusal::NONE;
+            let reset = AxisCommand { request: Some(Request::FaultReset), ..AxisCommand::default() };
+            self.send(around, axis, reset);
+        }
+        if reaction.contains(Reaction::ENABLE) {
+            (self.refusal, self.enabling, self.begun, self.has_operated) =
+                (Refusal::NONE, Some(now), None, false);
+            (self.target, self.done) = (None, false);
+        }
+        if around.link == Link::Run
+            && let Some(refusal) = output.refusal
+        {
+            self.refusal = refusal;
+        }
+        self.enable(around, axis);
+        if self.handshake.state() != State::Enabled && !is_faulted(axis) && is_operating(axis) {
+            // Held after a lost command, and the fault was reset: nobody wants the torque.
+            self.disable(around, axis);
+        }
+        if self.handshake.state() == State::Enabled && is_operating(axis) {
+            self.operate(around, axis, output, reaction);
+        }
+        self.generate(around, axis);
+    }
+
+    /// How the axis stops is what the configuration says from the moment at which a controller has it.
+    fn connect(&mut self, axis: &mut AxisChannel) {
+        let connected = axis.has_controller();
+        if connected && !self.connected {
+            axis.set_stop_settings(self.stops);
+            axis.end_set_points();
+            self.refusal = Refusal::NONE;
+        }
+        self.connected = connected;
+    }
+
+    fn forget_enable(&mut self) {
+        (self.enabling, self.begun, self.source, self.followed) = (None, None, Source::None, None);
+    }
+
+    /// The controller is gone or idle.
+    fn lose(&mut self, around: &Around<'_>, axis: &mut AxisChannel) {
+        let (now, system) = around.now;
+        self.forget_enable();
+        axis.lose_north(now, system);
+        if !is_faulted(axis) {
+            // It was not running: what may be under way ends as a disable does.
+            self.disable(around, axis);
+        }
+    }
+
+    fn disable(&mut self, around: &Around<'_>, axis: &mut AxisChannel) {
+        let (now, system) = around.now;
+        self.forget_enable();
+        axis.take_wish(now, system, Wish { intent: Intent::Disable, request: Some(Request::Disable) });
+        axis.end_set_points();
+    }
+
+    /// Enables the drive once it is ready; gives up when it does not become ready, or falls out of operation.
+    fn enable(&mut self, around: &Around<'_>, axis: &mut AxisChannel) {
+        let (now, system) = around.now;
+        if self.handshake.state() != State::Enabled {
+            return;
+        }
+        self.has_operated |= is_operating(axis);
+        let Some(since) = self.enabling else { return };
+        let late = match self.begun {
+            None if axis.state() == DriveState::Ready => {
+                self.begun = Some(now);
+                axis.end_set_points();
+                axis.take_wish(now, system, Wish { intent: Intent::Enable, request: Some(Request::Enable) });
+                false
+            }
+            None => now.since(since) > READY_TIME_OUT,
+            Some(_) if self.has_operated => axis.state() != DriveState::Operating,
+            Some(begun) => now.since(begun) > START_TIME_OUT,
+        };
+        if late {
+            self.refusal = Refusal::NOT_READY;
+            self.handshake.lock();
+            self.disable(around, axis);
+        }
+    }
+
+    // ---- in operation ----------------------------------------------------------------------------------------------
+
+    fn operate(
+        &mut self,
+        around: &Around<'_>,
+        axis: &mut AxisChannel,
+        output: &AxisOutput,
+        reaction: Reaction,
+    ) {
+        if output.mode != self.mode {
+            if !self.rests(around.now.0) {
+                self.refusal = Refusal::MODE;
+                return self.brake(around, axis);
+            }
+            (self.mode, self.source, self.followed) = (output.mode, Source::None, None);
+            if is_cyclic(self.mode) {
+                axis.end_set_points();
+            }
+        }
+        if reaction.contains(Reaction::HALT) {
+            return self.brake(around, axis);
+        }
+        if reaction.contains(Reaction::START) {
+            (self.start_taken, self.done, self.target) = (true, false, None);
+            self.refusal = Refusal::NONE;
+        }
+        match self.mode {
+            mode::POSITION => {
+                if reaction.contains(Reaction::START)
+                    && let Err(refusal) = self.go(around, axis, output)
+                {
+                    self.refusal = refusal;
+                }
+            }
+            mode::VELOCITY => self.run(around, axis, output),
+            mode::CYCLIC_POSITION | mode::CYCLIC_VELOCITY | mode::CYCLIC_TORQUE => {
+                self.pass_on(around, axis, output);
+            }
+            0 => {}
+            _ => self.refusal = Refusal::MODE,
+        }
+    }
+
+    /// Starts a movement to the target.
+    fn go(
+        &mut self,
+        around: &Around<'_>,
+        axis: &mut AxisChannel,
+        output: &AxisOutput,
+    ) -> Result<(), Refusal> {
+        if let Some(refusal) = output.refusal {
+            return Err(refusal);
+        }
+        let (Some(target), Some(velocity)) = (output.position, output.velocity) else {
+            return Err(Refusal::MODE);
+        };
+        if !has(axis, POSITION) {
+            return Err(Refusal::MODE);
+        }
+        if velocity <= Velocity::ZERO {
+            return Err(Refusal::NOT_POSITIVE);
+        }
+        let acceleration = checked(axis, velocity, output.acceleration)?;
+        let here = match &self.source {
+            Source::Generator(generator) => generator.profile.position(),
+            Source::None | Source::Cyclic => axis.feedback().position,
+        };
+        let target = match output.control.contains(Control::RELATIVE) {
+            true => here.get().checked_add(target.get()).map(Position).ok_or(Refusal::VALUE)?,
+            false => target,
+        };
+        let limits = axis.limits();
+        let beyond = limits.position_max.is_some_and(|end| target > end)
+            || limits.position_min.is_some_and(|end| target < end);
+        if beyond {
+            return Err(Refusal::BEYOND_LIMIT);
+        }
+        let mut generator = self.generator(around, axis, POSITION, acceleration);
+        generator.profile.to_position(target, velocity, acceleration);
+        self.source = Source::Generator(generator);
+        self.target = Some(target);
+        Ok(())
+    }
+
+    /// Follows the velocity on the ramp of the generator.
+    fn run(&mut self, around: &Around<'_>, axis: &mut AxisChannel, output: &AxisOutput) {
+        let Some(velocity) = output.velocity else {
+            self.refusal = Refusal::MODE;
+            return;
+        };
+        let mode = [POSITION, VELOCITY].into_iter().find(|mode| has(axis, *mode));
+        let (Some(mode), Ok(acceleration)) = (mode, checked(axis, velocity, output.acceleration)) else {
+            let why = checked(axis, velocity, output.acceleration).err();
+            self.refusal = why.unwrap_or(Refusal::MODE);
+            return self.brake(around, axis);
+        };
+        if self.followed == Some((velocity, acceleration)) {
+            return;
+        }
+        let mut generator = self.generator(around, axis, mode, acceleration);
+        let limits = axis.limits();
+        let end = if velocity < Velocity::ZERO { limits.position_min } else { limits.position_max };
+        match end.filter(|_| mode == POSITION && velocity != Velocity::ZERO) {
+            // It brakes ahead of the end of its travel.
+            Some(end) => {
+                let speed = Velocity(velocity.get().saturating_abs());
+                generator.profile.to_position(end, speed, acceleration);
+            }
+            None => generator.profile.to_velocity(velocity, acceleration),
+        }
+        self.source = Source::Generator(generator);
+        self.followed = Some((velocity, acceleration));
+        if self.refusal != Refusal::BOTH_DIRECTIONS {
+            self.refusal = Refusal::NONE;
+        }
+    }
+
+    /// Hands the set-points of the controller on.
+    fn pass_on(&mut self, around: &Around<'_>, axis: &mut AxisChannel, output: &AxisOutput) {
+        let (now, system) = around.now;
+        let (Some(paced_at), Some(period)) = (around.paced_at, around.period) else { return };
+        let selection = ModeSelection {
+            mode: match self.mode {
+                mode::CYCLIC_POSITION => OperatingMode::Position,
+                mode::CYCLIC_VELOCITY => OperatingMode::Velocity,
+                _ => OperatingMode::Torque,
+            },
+            interpolation: InterpolationSource::Controller,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.source = Source::Cyclic;
+        let Some(command) = set_points(selection, output).filter(|_| has(axis, selection)) else {
+            self.refusal = Refusal::MODE;
+            return axis.refuse_set_points(now, system, self.sequence, FaultCause::ILLEGAL_MODE);
+        };
+        axis.keep_updates(Updates { period, may_miss: MAY_MISS, first: TargetUpdate::Interpolate });
+        // Without a common time a stamp says nothing.
+        let stamp = output.time_stamp.filter(|_| around.synchronized);
+        let target = match stamp {
+            Some(stamp) => Target::At(around.time.target_at(stamp), TargetUpdate::Interpolate),
+            None => Target::Paced(paced_at),
+        };
+        let unusable = u32::from(output.refusal.is_some());
+        let sequence = self.sequence;
+        let points = NorthPoints { command, sequence, target, saturated: 0, unusable, is_counted: false };
+        axis.take_set_points(now, system, points);
+    }
+
+    /// Brakes to standstill, and stays there.
+    fn brake(&mut self, around: &Around<'_>, axis: &mut AxisChannel) {
+        self.followed = None;
+        self.target = None;
+        let mode = match &self.source {
+            Source::Generator(generator) => Some(generator.mode),
+            // It holds the position at which it was enabled.
+            Source::None if self.rests(around.now.0) => return,
+            Source::None | Source::Cyclic => [POSITION, VELOCITY].into_iter().find(|mode| has(axis, *mode)),
+        };
+        let torque = self.mode == mode::CYCLIC_TORQUE;
+        // A generator in progress goes on with its own acceleration.
+        let acceleration = match &self.source {
+            Source::Generator(_) => Some(Acceleration(1)),
+            Source::None | Source::Cyclic => checked(axis, Velocity::ZERO, None).ok(),
+        };
+        let (Some(mode), Some(acceleration), false) = (mode, acceleration, torque) else {
+            // Nothing but the drive itself brakes an axis in torque control, or one without a known acceleration.
+            self.handshake.lock();
+            return self.disable(around, axis);
+        };
+        let mut generator = self.generator(around, axis, mode, acceleration);
+        generator.profile.brake();
+        self.source = Source::Generator(generator);
+    }
+
+    /// The generator in this mode: the one in progress, or one from how the axis moves.
+    fn generator(
+        &mut self,
+        around: &Around<'_>,
+        axis: &mut AxisChannel,
+        mode: ModeSelection,
+        braking: Acceleration,
+    ) -> Generator {
+        match self.source {
+            Source::Generator(generator) if generator.mode == mode => generator,
+            _ => {
+                axis.keep_updates(GENERATED);
+                Generator::from_axis(around.now.0, axis, mode, braking)
+            }
+        }
+    }
+
+    /// Sends the set-points of the generator that are due, and sees whether the movement is done.
+    fn generate(&mut self, around: &Around<'_>, axis: &mut AxisChannel) {
+        let Source::Generator(mut generator) = self.source else { return };
+        while let Some(command) = generator.poll(around.now.0) {
+            self.send(around, axis, command);
+        }
+        self.source = Source::Generator(generator);
+        if let Some(target) = self.target
+            && generator.profile.is_done()
+            && self.rests(around.now.0)
+        {
+            let bound = axis.limits().following_error.map_or(0, |limit| limit.get() / IN_POSITION_DIVISOR);
+            let bound = bound.max(IN_POSITION).unsigned_abs();
+            self.done = axis.feedback().position.get().abs_diff(target.get()) <= bound;
+        }
+    }
+
+    fn send(&mut self, around: &Around<'_>, axis: &mut AxisChannel, command: AxisCommand) {
+        let (now, system) = around.now;
+        self.sequence = self.sequence.wrapping_add(1);
+        axis.from_north(now, system, &AxisCommand { sequence: self.sequence, ..command });
+    }
+
+    fn rests(&self, now: MonotonicTime) -> bool {
+        self.slow_since.is_some_and(|since| now.since(since) >= REST_TIME)
+    }
+
+    // ---- to the controller -----------------------------------------------------------------------------------------
+
+    /// What the controller is shown.
+    pub fn input(&mut self, around: &Around<'_>, axis: &AxisChannel) -> AxisInput {
+        let now = around.now.0;
+        let feedback = axis.feedback();
+        self.toggle ^= std::mem::replace(&mut self.sampled_at, feedback.at) != feedback.at;
+        let moving = match &self.source {
+            Source::Generator(generator) => !generator.profile.is_done(),
+            Source::None => false,
+            Source::Cyclic => !axis.stands(),
+        };
+        let held = axis.owner() == Owner::Local;
+        let mut status = Status::empty();
+        for (bit, on) in [
+            (Status::READY, axis.state() == DriveState::Ready),
+            (Status::ENABLED, is_operating(axis) && !held),
+            (Status::FAULT, is_faulted(axis)),
+            (Status::MOVING, moving),
+            (Status::DONE, self.done),
+            (Status::START_TAKEN, self.start_taken),
+            (Status::REFUSED, self.refusal != Refusal::NONE),
+            (Status::LOCKED, self.handshake.state() == State::Locked),
+            (Status::RUN, around.link == Link::Run),
+            (Status::HELD, held),
+            (Status::STANDSTILL, axis.stands()),
+            (Status::SYNCHRONIZED, around.synchronized),
+            (Status::WARNING, feedback.status.contains(StatusBits::WARNING)),
+            (Status::TORQUE, axis.may_have_torque()),
+            (Status::TOGGLE, self.toggle),
+        ] {
+            status.set(bit, on);
+        }
+        let age = now.since(feedback.at).as_nanos() / 1_000;
+        let known = feedback.at != MonotonicTime::ZERO;
+        let has = |signal| feedback.present.contains(signal);
+        let stamp =
+            if known && around.synchronized { around.time.system_at(feedback.at) } else { SystemTime(0) };
+        let at_reference = match (&self.source, self.followed) {
+            (Source::Generator(generator), Some((velocity, _))) => generator.profile.velocity() == velocity,
+            _ => false,
+        };
+        AxisInput {
+            status,
+            mode: self.mode,
+            refusal: self.refusal,
+            fault: axis.fault().map_or(0, |fault| fault.cause.0),
+            position: feedback.position,
+            velocity: feedback.velocity,
+            torque: feedback.torque,
+            following_error: feedback.following_error,
+            inputs: if has(FeedbackSet::DIGITAL_INPUTS) { feedback.digital_inputs } else { 0 },
+            age_us: if known { u32::try_from(age).unwrap_or(u32::MAX) } else { u32::MAX },
+            time_stamp: stamp,
+            at_reference,
+        }
+    }
+}
+
+/// The set-points of a mode, with offsets; `None` when the layout has no field for them.
+fn set_points(selection: ModeSelection, output: &AxisOutput) -> Option<AxisCommand> {
+    let mut command = AxisCommand::default();
+    command.select(selection);
+    match selection.mode {
+        OperatingMode::Position => {
+            command.position = output.position.or(output.refusal.map(|_| Position::ZERO))?;
+            command.present |= CommandSet::POSITION;
+        }
+        OperatingMode::Velocity => {
+            command.velocity = output.velocity.or(output.refusal.map(|_| Velocity::ZERO))?;
+            command.present |= CommandSet::VELOCITY;
+        }
+        _ => {
+            command.torque = output.torque?;
+            command.present |= CommandSet::TORQUE;
+        }
+    }
+    if let Some(offset) = output.velocity_offset {
+        command.velocity_offset = offset;
+        command.present |= CommandSet::VELOCITY_OFFSET;
+    }
+    if let Some(offset) = output.torque_offset {
+        command.torque_offset = offset;
+        command.present |= CommandSet::TORQUE_OFFSET;
+    }
+    Some(command)
+}
+
+/// Checks a velocity and an acceleration against the limits of the axis; returns the acceleration to use.
+fn checked(
+    axis: &AxisChannel,
+    velocity: Velocity,
+    acceleration: Option<Acceleration>,
+) -> Result<Acceleration, Refusal> {
+    let limits = axis.limits();
+    let beyond = |limit: Velocity| velocity.get().unsigned_abs() > limit.get().unsigned_abs();
+    if limits.velocity.is_some_and(beyond) {
+        return Err(Refusal::TOO_FAST);
+    }
+    let given = acceleration.filter(|given| *given != Acceleration::ZERO);
+    let configured = limits.acceleration.or(axis.stop_settings().deceleration);
+    let acceleration = given.or(configured).ok_or(Refusal::NOT_POSITIVE)?;
+    if acceleration <= Acceleration::ZERO {
+        return Err(Refusal::NOT_POSITIVE);
+    }
+    match limits.acceleration {
+        Some(limit) if acceleration > limit => Err(Refusal::TOO_STEEP),
+        _ => Ok(acceleration),
+    }
+}
+
+fn is_cyclic(mode: u8) -> bool {
+    matches!(mode, mode::CYCLIC_POSITION | mode::CYCLIC_VELOCITY | mode::CYCLIC_TORQUE)
+}
+
+fn has(axis: &AxisChannel, mode: ModeSelection) -> bool {
+    axis.south().is_some_and(|program| program.has_mode(mode))
+}
+
+fn is_operating(axis: &AxisChannel) -> bool {
+    axis.state() == DriveState::Operating && axis.sequence_step() == SequenceStep::Running
+}
+
+fn is_faulted(axis: &AxisChannel) -> bool {
+    axis.fault().is_some() || matches!(axis.state(), DriveState::Faulted | DriveState::FaultReaction)
+}

@@ -1,0 +1,226 @@
+//! The assembly side of the engine: a device whose axes any class 1 scanner moves through its assemblies.
+//!
+//! ```text
+//! datagrams --Connections--> AxisOutput --Handshake--> PlcAxis --wishes, set-points--> AxisChannel
+//!           <--------------- AxisInput  <------------------------- feedback, faults ---
+//! ```
+//!
+//! The layout of the assemblies and the handshake are `profile_cip::assembly`. There is one owner of the output assembly, and
+//! there may be others that only get the input assembly. While an owner is connected, the axes of the device are the
+//! controller's, as with CIP Motion.
+//!
+//! This runs in the cycle: it does not allocate or wait.
+
+mod axis;
+mod connections;
+mod generator;
+
+use std::net::{Ipv4Addr, SocketAddrV4};
+
+use profile_cip::assembly::{Assemblies, Link, Scale};
+use profile_cip::device::motion_link::{ExplicitReply, MotionReply, MotionRequest, Token};
+use profile_cip::device::visualization::{self, Indication, NetworkCondition};
+use profile_cip::wire::status::GeneralStatus;
+use profile_generic::time::{DurationNs, MonotonicTime};
+
+use self::axis::{Around, PlcAxis};
+use self::connections::{Connections, Counts};
+use super::axis::{AxisChannel, StopSettings};
+use super::north::{Exchange, North};
+use super::notice::Notice;
+use super::port::NorthPort;
+use crate::north::DeviceEnd;
+
+/// Explicit requests handled in one cycle.
+const REQUESTS_PER_CYCLE: usize = 4;
+
+/// An axis of a device with assemblies.
+#[derive(Debug, Clone, Copy)]
+pub struct AssemblyAxis {
+    /// Number of the axis in the engine.
+    pub axis: usize,
+    /// Its counts.
+    pub scale: Scale,
+    /// How it stops.
+    pub stops: StopSettings,
+}
+
+/// A device with assemblies.
+#[derive(Debug)]
+pub struct AssemblyChannel {
+    number: u8,
+    assemblies: Assemblies,
+    link: DeviceEnd,
+    connections: Connections,
+    axes: Vec<PlcAxis>,
+    /// The input assembly as it is now.
+    input: Box<[u8]>,
+    /// Whether system time can be trusted.
+    synchronized: bool,
+    /// Somebody wants to know whether the device may be started anew.
+    reset: Option<Token>,
+    /// A connection was lost, and no other has followed.
+    lost: bool,
+}
+
+impl AssemblyChannel {
+    /// A device with its axes in the order of its assemblies.
+    #[must_use]
+    pub fn new(number: u8, assemblies: Assemblies, link: DeviceEnd, axes: &[AssemblyAxis]) -> Self {
+        let input = vec![0; assemblies.input_len()].into_boxed_slice();
+        Self {
+            number,
+            connections: Connections::new(&assemblies),
+            assemblies,
+            link,
+            axes: axes.iter().map(PlcAxis::new).collect(),
+            input,
+            synchronized: false,
+            reset: None,
+            lost: false,
+        }
+    }
+
+    /// Its number in the gateway, from 0.
+    #[must_use]
+    pub fn number(&self) -> u8 {
+        self.number
+    }
+
+    /// The engine's numbers of its axes, in the order of the assemblies.
+    pub fn members(&self) -> impl Iterator<Item = usize> + '_ {
+        self.axes.iter().map(|axis| axis.number)
+    }
+
+    /// The counts of its axes, in the same order.
+    pub fn scales(&self) -> impl Iterator<Item = Scale> + '_ {
+        self.axes.iter().map(|axis| axis.scale)
+    }
+
+    /// Address and interval of the owner, in microseconds, while there is one.
+    #[must_use]
+    pub fn owner(&self) -> Option<(Ipv4Addr, u32)> {
+        self.connections.owner().map(|open| (open.originator, open.rpi_us))
+    }
+
+    /// What its connections have counted.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.connections.counts()
+    }
+
+    /// Sets whether system time can be trusted.
+    pub fn set_synchronized(&mut self, synchronized: bool) {
+        self.synchronized = synchronized;
+    }
+
+    /// The shortest interval of its connections.
+    #[must_use]
+    pub fn update_period(&self) -> Option<DurationNs> {
+        self.connections.shortest_interval()
+    }
+
+    /// What the Network Status LED of the device shows.
+    #[must_use]
+    pub fn network_status(&self) -> Indication {
+        visualization::network_status(&NetworkCondition {
+            self_test: false,
+            address: true,
+            duplicate: false,
+            connected: self.connections.any() || self.link.explicit_connections() > 0,
+            timed_out: self.lost,
+        })
+    }
+
+    /// Sets on each axis of the device whether a controller is connected.
+    pub fn publish_connection(&self, axes: &mut [AxisChannel]) {
+        let connected = self.connections.owner().is_some();
+        self.axes.iter().for_each(|axis| axes[axis.number].set_controller(connected));
+    }
+
+    /// Takes requests of the explicit side and what came on the connections.
+    pub fn receive(&mut self, now: MonotonicTime, port: &mut dyn NorthPort) {
+        for _ in 0..REQUESTS_PER_CYCLE {
+            let Some(request) = self.link.request() else { break };
+            let reply = match request {
+                MotionRequest::Open(open) => {
+                    let outcome = self.connections.open(now, open);
+                    self.lost &= outcome.is_err();
+                    MotionReply::Opened { token: open.token, outcome }
+                }
+                MotionRequest::Close(close) => {
+                    self.connections.close(close.o_to_t_id);
+                    MotionReply::Closed { token: close.token }
+                }
+                // The adapter hands none on for a device without axis objects.
+                MotionRequest::Explicit(explicit) => {
+                    let status = GeneralStatus::SERVICE_NOT_SUPPORTED.0;
+                    MotionReply::Explicit(ExplicitReply::status(explicit.token, status))
+                }
+                MotionRequest::PrepareReset(token) => {
+                    self.reset = Some(token);
+                    continue;
+                }
+            };
+            // A full queue means that the explicit side has given up waiting.
+            let _ = self.link.reply(reply);
+        }
+        self.connections.receive(now, port);
+        while let Some((o_to_t_id, silent_us)) = self.connections.poll_lost(now) {
+            self.lost = true;
+            let _ = self.link.reply(MotionReply::ConnectionLost { o_to_t_id, silent_us });
+        }
+        self.connections.end_listen_only();
+        while let Some(o_to_t_id) = self.connections.poll_ended() {
+            let _ = self.link.reply(MotionReply::ConnectionLost { o_to_t_id, silent_us: 0 });
+        }
+    }
+
+    /// Sends the input assembly on each connection on which it is due.
+    pub fn transmit(&mut self, now: MonotonicTime, port: &mut dyn NorthPort) {
+        self.connections.transmit(now, &self.input, port);
+    }
+
+    /// Answers whether the device may be started anew: nobody is connected, and no axis has torque.
+    fn answer_reset(&mut self, axes: &[AxisChannel]) {
+        if let Some(token) = self.reset.take() {
+            let torque = self.axes.iter().any(|axis| axes[axis.number].may_have_torque());
+            let granted = !self.connections.any() && !torque;
+            let _ = self.link.reply(MotionReply::ResetPrepared { token, granted });
+        }
+    }
+}
+
+impl North for AssemblyChannel {
+    /// Hands each axis what the controller wants of it, and puts the input assembly together.
+    fn exchange(&mut self, exchange: &mut Exchange<'_>) {
+        let Exchange { now, time, ending, ref mut axes, ref mut notice, .. } = *exchange;
+        self.answer_reset(axes);
+        let fresh = self.connections.take_fresh();
+        let data = self.connections.output();
+        let owner = self.connections.owner();
+        let around = Around {
+            now: (now, time.system_at(now)),
+            time,
+            synchronized: self.synchronized,
+            link: if ending { Link::Lost } else { self.connections.link() },
+            period: owner.map(|open| DurationNs::from_micros(i64::from(open.rpi_us))),
+            paced_at: fresh,
+        };
+        for (place, member) in self.axes.iter_mut().enumerate() {
+            let axis = &mut axes[member.number];
+            let output = data.and_then(|data| self.assemblies.output_of(place, data, member.scale).ok());
+            let output = output.unwrap_or_default();
+            member.follow(&around, axis, &output);
+            let values = member.input(&around, axis);
+            // The length is that of the assembly.
+            let _ = self.assemblies.put_input(place, &values, member.scale, &mut self.input);
+        }
+        if let Some((count, from, why)) = self.connections.strangers(now) {
+            notice(Notice::Strangers { device: self.number, count, from, why });
+        }
+    }
+}
+
+/// Where a connection's data go.
+type Destination = SocketAddrV4;

@@ -1,0 +1,766 @@
+//! A programmable controller moves axes through the assemblies of a device: through the whole chain, to the drives.
+
+use std::cell::RefCell;
+use std::net::{Ipv4Addr, SocketAddrV4};
+use std::rc::Rc;
+
+use axisbridge::engine::axis::Owner;
+use axisbridge::engine::local::{Failure, LocalNorth, Order, Request};
+use axisbridge_tests::rig::explicit::Client;
+use axisbridge_tests::rig::ports::Bytes;
+use axisbridge_tests::rig::{BOX, CONTROLLER, FIXED_BOX, Rig, Settings};
+use profile_cip::assembly::handshake::{Control, Status};
+use profile_cip::assembly::{Refusal, layout};
+use profile_cip::wire::ConnectionTriad;
+use profile_cip::wire::class1::Class1Datagram;
+use profile_cip::wire::forward_close::ForwardClose;
+use profile_cip::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
+use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
+use profile_generic::fault::FaultCause;
+use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
+
+const NANO: i64 = 1_000_000_000;
+/// Counts of the turntable in a revolution.
+const TURN: i32 = 1_000_000;
+/// Interval of both directions.
+const RPI: DurationNs = DurationNs::from_millis(4);
+const PLC_PORT: u16 = 2222;
+/// Time-out: four intervals.
+const MULTIPLIER: u8 = 0;
+
+/// The gateway of the rig with assemblies in place of CIP Motion.
+fn configuration(assembly: &str) -> String {
+    let limits = "following_error = 0.5\nvelocity = 20.0\nacceleration = 100.0";
+    let text = BOX.replacen("following_error = 0.5", limits, 1);
+    let text = text.replacen("following_error = 10.0", "following_error = 10.0\nacceleration = 5000.0", 1);
+    text.replacen("[device.identity]", &format!("assembly = {assembly}\n\n[device.identity]"), 1)
+}
+
+/// Connection and data of an input assembly.
+type Input = (u32, Vec<u8>);
+
+/// A programmable controller with one connection.
+struct Plc {
+    rig: Rig,
+    client: Client,
+    address: Ipv4Addr,
+    open: Option<(u32, ConnectionTriad)>,
+    sent: u32,
+    serial: u16,
+    run: bool,
+    /// The output assembly.
+    output: Vec<u8>,
+    /// The connections of the last input assemblies, and their data.
+    inputs: Rc<RefCell<Vec<Input>>>,
+}
+
+const T_TO_O_ID: u32 = 0x5500_0000;
+
+impl Plc {
+    fn new(assembly: &str) -> Self {
+        let len = if assembly.contains("motion") { 48 } else { 32 };
+        Self::on(Settings { configuration: configuration(assembly), ..Settings::default() }, len)
+    }
+
+    /// A gateway with these settings, whose output assembly has so many bytes.
+    fn on(settings: Settings, len: usize) -> Self {
+        let mut rig = Rig::ready(settings);
+        let inputs = Rc::<RefCell<Vec<_>>>::default();
+        let seen = Rc::clone(&inputs);
+        rig.tamper_actual = Some(Box::new(move |datagram: &mut Bytes| {
+            let datagram = Class1Datagram::parse(datagram.as_slice()).expect("a class 1 datagram");
+            seen.borrow_mut().push((datagram.connection_id, datagram.data.to_vec()));
+            false
+        }));
+        let client = Client::connect(&mut rig, CONTROLLER);
+        assert_eq!(rig.engine.assemblies().len(), 1);
+        Self {
+            rig,
+            client,
+            address: CONTROLLER,
+            open: None,
+            sent: 0,
+            serial: 0,
+            run: true,
+            output: vec![0; len],
+            inputs,
+        }
+    }
+
+    /// Sends a Forward_Open; its status, extended status and data.
+    fn ask_open(&mut self, consumed: u16, sizes: (u16, u16)) -> (u8, u16, Vec<u8>) {
+        self.serial += 1;
+        let triad = ConnectionTriad {
+            connection_serial: self.serial,
+            originator_vendor: 7,
+            originator_serial: 0x1234_5678,
+        };
+        let direction = |size| NetworkParameters {
+            redundant_owner: false,
+            connection_type: ConnectionType::POINT_TO_POINT,
+            priority: Priority::SCHEDULED,
+            variable: false,
+            size,
+        };
+        let point = |point: u16| [0x2C, point.to_le_bytes()[0]];
+        let produced = if consumed == 21 { 71 } else { layout::INPUT_POINT };
+        let path = [[0x20, 4], [0x24, 151], point(consumed), point(produced)].concat();
+        let us = u32::try_from(RPI.as_nanos() / 1_000).unwrap();
+        let open = ForwardOpen {
+            large: false,
+            priority_tick: 5,
+            timeout_ticks: 157,
+            o_to_t_id: 0,
+            t_to_o_id: T_TO_O_ID + u32::from(self.serial),
+            triad,
+            timeout_multiplier: MULTIPLIER,
+            o_to_t_rpi_us: us,
+            o_to_t: direction(sizes.0),
+            t_to_o_rpi_us: us,
+            t_to_o: direction(sizes.1),
+            transport: Transport { server: false, trigger: Trigger::CYCLIC, class: 1 },
+            path: &path,
+        };
+        let mut data = vec![0; open.buffer_len()];
+        open.emit(&mut data).unwrap();
+        let answer = self.client.request_extended(&mut self.rig, 0x54, &[0x20, 6, 0x24, 1], &data);
+        if answer.0 == 0 {
+            let reply = ForwardOpenReply::parse(&answer.2).unwrap();
+            self.open = Some((reply.o_to_t_id, triad));
+            self.sent = 0;
+        }
+        answer
+    }
+
+    fn connect(&mut self) {
+        let (point, size) = match self.output.len() {
+            4 => (21, 6),
+            48 => (layout::OUTPUT_POINT, 66),
+            64 => (layout::OUTPUT_POINT, 82),
+            _ => (layout::OUTPUT_POINT, 42),
+        };
+        let answer = self.ask_open(point, (self.o_to_t_size(), size));
+        assert_eq!((answer.0, answer.1), (0, 0));
+    }
+
+    fn o_to_t_size(&self) -> u16 {
+        u16::try_from(self.output.len() + 6).unwrap()
+    }
+
+    fn close(&mut self) {
+        let (_, triad) = self.open.take().expect("a connection");
+        let close = ForwardClose { priority_tick: 5, timeout_ticks: 157, triad, path: &[] };
+        let mut data = vec![0; close.buffer_len()];
+        close.emit(&mut data).unwrap();
+        let answer = self.client.request(&mut self.rig, 0x4E, &[0x20, 6, 0x24, 1], &data);
+        assert_eq!(answer.0, 0);
+    }
+
+    fn send(&mut self, data: &[u8]) {
+        let Some((connection_id, _)) = self.open else { return };
+        self.sent += 1;
+        let [low, high, ..] = self.sent.to_le_bytes();
+        let datagram = Class1Datagram {
+            connection_id,
+            encapsulation_sequence: self.sent,
+            sequence_count: u16::from_le_bytes([low, high]),
+            data,
+        };
+        let mut bytes = vec![0; datagram.buffer_len()];
+        datagram.emit(&mut bytes).unwrap();
+        self.rig.inject_datagram(&bytes, SocketAddrV4::new(self.address, PLC_PORT));
+    }
+
+    /// One interval.
+    fn scan(&mut self) {
+        let header = u32::from(self.run).to_le_bytes();
+        let data = [&header[..], &self.output].concat();
+        self.send(&data);
+        self.rig.run_for(RPI);
+    }
+
+    fn run_for(&mut self, millis: i64) {
+        for _ in 0..millis / 4 {
+            self.scan();
+        }
+    }
+
+    fn until(&mut self, limit_ms: i64, what: &str, done: impl Fn(&Self) -> bool) {
+        for _ in 0..limit_ms / 4 {
+            if done(self) {
+                return;
+            }
+            self.scan();
+        }
+        let told = self.rig.told();
+        panic!("{what} is not reached in {limit_ms} ms: {:?} {:?}\n{told}", self.status(), self.refusal());
+    }
+
+    fn word(&mut self, word: Control) {
+        self.output[..2].copy_from_slice(&word.bits().to_le_bytes());
+    }
+
+    /// Target, velocity and acceleration of the turntable, in counts.
+    fn target(&mut self, target: i32, velocity: i32, acceleration: i32) {
+        self.output[4..8].copy_from_slice(&target.to_le_bytes());
+        self.output[8..12].copy_from_slice(&velocity.to_le_bytes());
+        self.output[12..16].copy_from_slice(&acceleration.to_le_bytes());
+    }
+
+    fn input(&self) -> Vec<u8> {
+        self.inputs.borrow().last().expect("an input assembly").1.clone()
+    }
+
+    fn status(&self) -> Status {
+        let input = self.input();
+        Status::from_bits_retain(u16::from_le_bytes([input[0], input[1]]))
+    }
+
+    fn is(&self, status: Status) -> bool {
+        self.status().contains(status)
+    }
+
+    fn refusal(&self) -> Refusal {
+        Refusal(self.input()[3])
+    }
+
+    fn fault(&self) -> FaultCause {
+        let input = self.input();
+        FaultCause(u16::from_le_bytes([input[4], input[5]]))
+    }
+
+    fn shown(&self) -> i32 {
+        i32::from_le_bytes(self.input()[8..12].try_into().unwrap())
+    }
+
+    fn place(&self) -> i64 {
+        self.rig.drive(0).servo().position().get()
+    }
+
+    fn speed(&self) -> i64 {
+        self.rig.drive(0).actual().velocity.get()
+    }
+
+    fn state(&self) -> DriveState {
+        self.rig.engine.axes()[0].state()
+    }
+
+    fn enable(&mut self) {
+        self.word(Control::empty());
+        self.run_for(40);
+        self.word(Control::ENABLE);
+        self.until(2_000, "operation", |plc| plc.is(Status::ENABLED));
+    }
+
+    /// Enabled, and amid a long movement at one revolution a second.
+    fn in_motion() -> Self {
+        Self::new("{}").moving()
+    }
+
+    fn moving(self) -> Self {
+        let mut plc = self;
+        plc.connect();
+        plc.enable();
+        plc.target(20 * TURN, TURN, 10 * TURN);
+        plc.word(Control::ENABLE | Control::START);
+        plc.run_for(600);
+        assert!((plc.speed() - NANO).abs() < NANO / 50, "{}", plc.speed());
+        plc
+    }
+
+    /// Nothing moves and nothing has torque, whatever the word says, for a second.
+    fn stays_off(&mut self) {
+        let place = self.place();
+        for _ in 0..250 {
+            self.scan();
+            assert!(self.rig.torque_free());
+        }
+        assert!((self.place() - place).abs() < NANO / 10_000, "{} {place}", self.place());
+    }
+}
+
+const ALL: Control = Control::ENABLE.union(Control::START).union(Control::RESET);
+
+#[test]
+fn a_plc_enables_an_axis_moves_it_and_takes_its_torque_away() {
+    let mut plc = Plc::new("{}");
+    assert_eq!(plc.rig.status().axes[0].owner, Owner::Nobody);
+    plc.connect();
+    plc.word(Control::ENABLE);
+    plc.target(3 * TURN / 2, TURN, 0);
+    plc.run_for(40);
+    assert!(plc.is(Status::RUN | Status::LOCKED), "{:?}", plc.status());
+    assert_eq!(plc.rig.status().axes[0].owner, Owner::Controller);
+    plc.stays_off();
+
+    plc.enable();
+    assert!(!plc.is(Status::LOCKED) && plc.is(Status::TORQUE), "{:?}", plc.status());
+    plc.run_for(100);
+    assert!(plc.place().abs() < NANO / 1_000, "it holds: {}", plc.place());
+    plc.word(Control::ENABLE | Control::START);
+    plc.until(200, "START", |plc| plc.is(Status::START_TAKEN | Status::MOVING));
+    plc.until(4_000, "the target", |plc| plc.is(Status::DONE));
+    assert!((plc.place() - 3 * NANO / 2).abs() < NANO / 1_000, "{}", plc.place());
+    assert!((plc.shown() - 3 * TURN / 2).abs() < TURN / 1_000, "{}", plc.shown());
+
+    // The same START moves once. RELATIVE counts from the set-point.
+    plc.target(TURN / 4, 2 * TURN, 20 * TURN);
+    plc.run_for(400);
+    assert!((plc.place() - 3 * NANO / 2).abs() < NANO / 1_000, "START is still of before");
+    plc.word(Control::ENABLE);
+    plc.run_for(20);
+    assert!(!plc.is(Status::START_TAKEN) && plc.is(Status::DONE));
+    plc.word(Control::ENABLE | Control::START | Control::RELATIVE);
+    plc.run_for(20);
+    assert!(!plc.is(Status::DONE));
+    plc.until(4_000, "the target", |plc| plc.is(Status::DONE));
+    assert!((plc.place() - 7 * NANO / 4).abs() < NANO / 1_000, "{}", plc.place());
+
+    // The other axis of the device has done nothing.
+    assert!(plc.rig.drive(1).servo().position().get().abs() < NANO / 1_000);
+    assert!(!plc.rig.watched[1].on);
+    plc.word(Control::empty());
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    plc.run_for(40);
+    assert_eq!((plc.fault(), plc.refusal()), (FaultCause(0), Refusal::NONE));
+    assert_eq!(plc.state(), DriveState::Ready);
+}
+
+#[test]
+fn stop_brakes_with_torque_and_wins_over_start() {
+    let mut plc = Plc::in_motion();
+    plc.word(Control::ENABLE | Control::STOP);
+    plc.until(1_000, "standstill", |plc| plc.is(Status::STANDSTILL) && !plc.is(Status::MOVING));
+    let place = plc.place();
+    assert!((NANO / 5..2 * NANO).contains(&place), "{place}");
+    plc.word(Control::ENABLE | Control::STOP | Control::START);
+    plc.run_for(200);
+    assert_eq!(plc.refusal(), Refusal::STOP_WINS);
+    assert!(plc.is(Status::ENABLED | Status::REFUSED) && !plc.is(Status::DONE));
+    plc.word(Control::ENABLE);
+    plc.run_for(400);
+    assert!((plc.place() - place).abs() < NANO / 100, "it stays: {} {place}", plc.place());
+    plc.target(0, 2 * TURN, 0);
+    plc.word(Control::ENABLE | Control::START);
+    plc.until(4_000, "the target", |plc| plc.is(Status::DONE));
+    assert!(plc.place().abs() < NANO / 1_000, "{}", plc.place());
+    assert_eq!(plc.refusal(), Refusal::NONE);
+}
+
+#[test]
+fn idle_stops_as_configured_and_nothing_moves_when_it_runs_again() {
+    let mut plc = Plc::in_motion();
+    plc.run = false;
+    plc.until(1_000, "the stop", |plc| plc.rig.torque_free());
+    plc.run_for(100);
+    assert_eq!(plc.fault(), FaultCause::COMMAND_LOST);
+    assert!(!plc.is(Status::RUN) && plc.is(Status::FAULT | Status::LOCKED));
+    plc.run = true;
+    plc.word(ALL);
+    plc.stays_off();
+    assert_eq!(plc.fault(), FaultCause::COMMAND_LOST, "a level resets nothing");
+
+    plc.word(Control::empty());
+    plc.run_for(40);
+    plc.word(Control::RESET);
+    plc.until(1_000, "the end of the fault", |plc| !plc.is(Status::FAULT));
+    let place = plc.place();
+    plc.enable();
+    plc.run_for(200);
+    assert!((plc.place() - place).abs() < NANO / 1_000, "enabled, it holds");
+}
+
+#[test]
+fn a_lost_connection_stops_as_configured_and_nothing_moves_on_the_next_one() {
+    let mut plc = Plc::in_motion();
+    let before = plc.rig.now();
+    let gone = plc.open.take();
+    plc.rig.run_until(DurationNs::from_secs(1), "the stop", |rig| rig.engine.axes()[0].fault().is_some());
+    let silence = plc.rig.now().since(before);
+    // The last data came an interval before, and four of silence are the end.
+    assert!(silence >= RPI * 3 && silence <= RPI * 4, "{silence}");
+    plc.rig.run_until(DurationNs::from_secs(1), "the end of the torque", Rig::torque_free);
+    plc.rig.run_for(DurationNs::from_millis(50));
+    assert_eq!(plc.rig.status().axes[0].controller, None);
+    assert_eq!(plc.rig.status().axes[0].owner, Owner::Nobody);
+
+    // Data of the connection that is gone do nothing.
+    plc.open = gone;
+    plc.word(ALL);
+    plc.stays_off();
+    plc.connect();
+    plc.stays_off();
+    assert_eq!(plc.fault(), FaultCause::COMMAND_LOST);
+    plc.word(Control::empty());
+    plc.run_for(20);
+    plc.word(Control::ENABLE);
+    plc.run_for(20);
+    assert_eq!(plc.refusal(), Refusal::FAULT, "an edge does not enable an axis with a fault");
+    plc.word(Control::empty());
+    plc.run_for(20);
+    plc.word(Control::RESET);
+    plc.until(1_000, "the end of the fault", |plc| !plc.is(Status::FAULT));
+    plc.enable();
+}
+
+#[test]
+fn an_axis_that_holds_after_a_loss_loses_its_torque_with_the_reset() {
+    let hold = "motion_resolution = 1_000_000\non_command_loss = \"ramped-decel-and-hold\"";
+    let text = configuration("{}").replacen("motion_resolution = 1_000_000", hold, 1);
+    let mut plc = Plc::on(Settings { configuration: text, ..Settings::default() }, 32).moving();
+    plc.open = None;
+    plc.rig.run_for(DurationNs::from_millis(600));
+    assert!(plc.rig.watched[0].on, "it holds with torque");
+    let place = plc.place();
+    plc.connect();
+    plc.word(ALL);
+    plc.run_for(400);
+    assert!((plc.place() - place).abs() < NANO / 1_000, "{} {place}", plc.place());
+    assert!(plc.is(Status::FAULT | Status::TORQUE | Status::LOCKED));
+    plc.word(Control::empty());
+    plc.run_for(40);
+    plc.word(Control::RESET);
+    plc.until(2_000, "the end of the torque", |plc| plc.rig.torque_free());
+    plc.run_for(40);
+    assert!((plc.place() - place).abs() < NANO / 1_000, "{} {place}", plc.place());
+    assert_eq!((plc.fault(), plc.state()), (FaultCause(0), DriveState::Ready));
+    plc.enable();
+}
+
+#[test]
+fn local_control_moves_the_axis_only_while_no_controller_owns_it() {
+    let mut plc = Plc::new("{}");
+    let (local, mut end) = LocalNorth::new(plc.rig.engine.axes().len());
+    plc.rig.engine.set_local(local);
+    let mut order = |plc: &mut Plc, id, order| {
+        end.requests.push(Request::Order { client: 1, id, axis: 0, order }).expect("room");
+        for _ in 0..1_000 {
+            if let Ok(answer) = end.answers.pop() {
+                return answer.result.map(|_| ());
+            }
+            plc.scan();
+        }
+        panic!("no answer");
+    };
+    assert_eq!(order(&mut plc, 1, Order::Enable), Ok(()));
+    assert_eq!(plc.rig.status().axes[0].owner, Owner::Local);
+    // The controller takes it, and finds it without torque.
+    plc.connect();
+    plc.word(Control::empty());
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    assert_eq!(plc.rig.status().axes[0].owner, Owner::Controller);
+    assert_eq!(order(&mut plc, 2, Order::Enable), Err(Failure::Controller));
+    plc.enable();
+}
+
+#[test]
+fn a_closed_connection_stops_as_a_lost_one() {
+    let mut plc = Plc::in_motion();
+    plc.close();
+    plc.rig.run_until(DurationNs::from_secs(1), "the end of the torque", Rig::torque_free);
+    assert_eq!(plc.rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::COMMAND_LOST));
+    plc.connect();
+    plc.word(ALL);
+    plc.stays_off();
+}
+
+#[test]
+fn a_fault_of_the_drive_is_shown_and_reset_by_an_edge() {
+    let mut plc = Plc::in_motion();
+    plc.rig.drive_mut(0).raise_fault(FaultCause::OVER_CURRENT);
+    plc.until(500, "the fault", |plc| plc.is(Status::FAULT));
+    plc.until(500, "its cause", |plc| plc.fault() == FaultCause::OVER_CURRENT);
+    assert!(plc.rig.torque_free() && plc.is(Status::LOCKED));
+    plc.rig.drive_mut(0).clear_fault(FaultCause::OVER_CURRENT);
+    plc.run_for(200);
+    assert_eq!(plc.fault(), FaultCause::OVER_CURRENT, "it is latched");
+    plc.word(Control::ENABLE | Control::RESET);
+    plc.until(1_000, "the end of the fault", |plc| !plc.is(Status::FAULT));
+    plc.stays_off();
+    plc.enable();
+    assert_eq!(plc.fault(), FaultCause(0));
+}
+
+#[test]
+fn orders_that_cannot_be_carried_out_are_refused_with_their_reason() {
+    let mut plc = Plc::new("{}");
+    plc.connect();
+    plc.word(Control::empty());
+    plc.run_for(20);
+    plc.word(Control::START);
+    plc.run_for(20);
+    assert_eq!(plc.refusal(), Refusal::NOT_ENABLED);
+    plc.enable();
+    for (target, velocity, acceleration, refusal) in [
+        (TURN, 21 * TURN, 0, Refusal::TOO_FAST),
+        (TURN, TURN, 101 * TURN, Refusal::TOO_STEEP),
+        (TURN, 0, 0, Refusal::NOT_POSITIVE),
+        (TURN, -TURN, 0, Refusal::NOT_POSITIVE),
+        (TURN, TURN, -1, Refusal::NOT_POSITIVE),
+    ] {
+        plc.word(Control::ENABLE);
+        plc.run_for(20);
+        plc.target(target, velocity, acceleration);
+        plc.word(Control::ENABLE | Control::START);
+        plc.run_for(100);
+        assert_eq!(plc.refusal(), refusal);
+        assert!(plc.is(Status::ENABLED | Status::REFUSED) && !plc.is(Status::MOVING));
+    }
+    assert!(plc.place().abs() < NANO / 1_000, "{}", plc.place());
+    // A word that is not understood takes the torque away.
+    plc.word(Control::from_bits_retain(0x0101));
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    plc.run_for(20);
+    assert_eq!(plc.refusal(), Refusal::RESERVED_BITS);
+    // The slide has limits of its travel: -5 and 1000 mm, 10 000 counts each.
+    plc.word(Control::empty());
+    plc.output[16..18].copy_from_slice(&0_u16.to_le_bytes());
+    plc.run_for(40);
+    plc.output[16..18].copy_from_slice(&Control::ENABLE.bits().to_le_bytes());
+    plc.until(2_000, "operation", |plc| plc.rig.engine.axes()[1].state() == DriveState::Operating);
+    plc.output[20..24].copy_from_slice(&10_000_001_i32.to_le_bytes());
+    plc.output[24..28].copy_from_slice(&100_000_i32.to_le_bytes());
+    plc.output[16..18].copy_from_slice(&(Control::ENABLE | Control::START).bits().to_le_bytes());
+    plc.run_for(100);
+    assert_eq!(Refusal(plc.input()[23]), Refusal::BEYOND_LIMIT);
+}
+
+#[test]
+fn a_second_owner_and_wrong_sizes_are_refused_and_readers_are_served_beside() {
+    let mut plc = Plc::in_motion();
+    let owner = plc.open;
+    assert_eq!(plc.ask_open(layout::OUTPUT_POINT, (38, 42)).1, 0x106);
+    assert_eq!(plc.ask_open(layout::OUTPUT_POINT, (39, 42)).1, 0x127);
+    assert_eq!(plc.ask_open(layout::OUTPUT_POINT, (38, 43)).1, 0x128);
+    assert_eq!(plc.open, owner);
+    // The exchange of the refusals has taken time in which nothing was sent.
+    let mut plc = Plc::in_motion();
+    let (owner, sent) = (plc.open, plc.sent);
+    assert_eq!(plc.ask_open(layout::INPUT_ONLY_POINT, (2, 42)).0, 0);
+    let reader = T_TO_O_ID + u32::from(plc.serial);
+    (plc.open, plc.sent) = (owner, sent);
+    plc.inputs.borrow_mut().clear();
+    plc.run_for(200);
+    assert!(plc.is(Status::ENABLED | Status::MOVING), "{:?}", plc.status());
+    let of_reader = plc.inputs.borrow().iter().filter(|(id, _)| *id == reader).count();
+    assert!((45..=55).contains(&of_reader), "{of_reader}");
+    // Data of a wrong length do not count: the connection times out.
+    for _ in 0..8 {
+        plc.send(&[1, 0, 0, 0, 1, 0]);
+        plc.rig.run_for(RPI);
+    }
+    let fault = plc.rig.engine.axes()[0].fault().map(|fault| fault.cause);
+    assert_eq!(fault, Some(FaultCause::COMMAND_LOST));
+}
+
+/// A movement of two seconds to two revolutions: a second up to two revolutions a second, a second down.
+fn curve(seconds: f64) -> f64 {
+    match seconds {
+        t if t <= 0.0 => 0.0,
+        t if t <= 1.0 => t * t,
+        t if t <= 2.0 => 2.0 - (2.0 - t) * (2.0 - t),
+        _ => 2.0,
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a few million counts")]
+fn counts(revolutions: f64) -> i64 {
+    (revolutions * f64::from(TURN)).round() as i64
+}
+
+impl Plc {
+    /// Enabled with the layout of cyclic positions.
+    fn cyclic() -> Self {
+        let mut plc = Self::new("{ layout = \"motion\" }");
+        plc.connect();
+        plc.enable();
+        plc
+    }
+
+    /// Sends the curve for so many milliseconds; the stamps are that far ahead, if there are some. Returns the largest distance
+    /// of the drive from the curve at the instant of the stamp, in nanounits, and the fastest it was.
+    fn follow(&mut self, millis: i64, ahead: Option<DurationNs>) -> (i64, i64) {
+        let start = self.rig.now();
+        let (mut away, mut fastest) = (0, 0);
+        for _ in 0..millis / 4 {
+            let seconds = |span: DurationNs| profile_generic::cast::f64_from_i64(span.as_nanos()) / 1e9;
+            let passed = self.rig.now().since(start);
+            let set_point = counts(curve(seconds(passed + ahead.unwrap_or(DurationNs::ZERO))));
+            self.output[8..16].copy_from_slice(&set_point.to_le_bytes());
+            let stamp = ahead.map_or(0, |ahead| self.rig.system().0 + ahead.magnitude());
+            self.output[16..24].copy_from_slice(&stamp.to_le_bytes());
+            self.scan();
+            let here = counts(curve(seconds(self.rig.now().since(start)))) * 1_000;
+            away = away.max((self.place() - here).abs());
+            fastest = fastest.max(self.speed().abs());
+        }
+        (away, fastest)
+    }
+}
+
+#[test]
+fn cyclic_set_points_are_followed_with_stamps_at_their_instants() {
+    let mut plc = Plc::cyclic();
+    let (away, fastest) = plc.follow(2_200, Some(RPI * 3));
+    assert!((plc.place() - 2 * NANO).abs() < NANO / 1_000, "{}", plc.place());
+    assert!((2 * NANO - NANO / 20..=2 * NANO + NANO / 20).contains(&fastest), "{fastest}");
+    let stamped = away;
+    assert!(plc.is(Status::ENABLED | Status::SYNCHRONIZED));
+
+    let mut plc = Plc::cyclic();
+    let (away, fastest) = plc.follow(2_200, None);
+    assert!((plc.place() - 2 * NANO).abs() < NANO / 1_000, "{}", plc.place());
+    assert!((2 * NANO - NANO / 20..=2 * NANO + NANO / 20).contains(&fastest), "{fastest}");
+    // Without stamps a set-point is for as soon as possible, which is some milliseconds later: 2 revolutions a second are
+    // 2 thousandths in each of them.
+    assert!(away > stamped + NANO / 100, "{away} {stamped}");
+    assert_eq!(plc.rig.engine.axes()[0].fault(), None);
+    // The input has the actual position in 64 bits and its instant.
+    let input = plc.input();
+    let shown = i64::from_le_bytes(input[8..16].try_into().unwrap());
+    assert!((shown - i64::from(2 * TURN)).abs() < 1_000, "{shown}");
+    let stamp = u64::from_le_bytes(input[16..24].try_into().unwrap());
+    let age = plc.rig.system().0 - stamp;
+    assert!(age < 10_000_000, "{age}");
+}
+
+#[test]
+fn stale_stamps_and_a_jump_stop_the_axis() {
+    let mut plc = Plc::cyclic();
+    plc.follow(500, Some(RPI * 3));
+    let stale = (plc.rig.system().0 - 1_000_000_000).to_le_bytes();
+    for _ in 0..20 {
+        plc.output[16..24].copy_from_slice(&stale);
+        plc.scan();
+    }
+    let fault = plc.rig.engine.axes()[0].fault().map(|fault| fault.cause);
+    assert_eq!(fault, Some(FaultCause::COMMAND_LOST));
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+
+    let mut plc = Plc::cyclic();
+    plc.follow(500, Some(RPI * 3));
+    let place = plc.place();
+    plc.output[8..16].copy_from_slice(&i64::from(5 * TURN).to_le_bytes());
+    let stamp = plc.rig.system().0 + (RPI * 3).magnitude();
+    plc.output[16..24].copy_from_slice(&stamp.to_le_bytes());
+    plc.until(500, "the fault", |plc| plc.is(Status::FAULT));
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    assert!((plc.place() - place).abs() < NANO / 2, "it did not jump: {} {place}", plc.place());
+}
+
+#[test]
+fn set_points_that_stop_coming_in_run_are_a_lost_command() {
+    let mut plc = Plc::cyclic();
+    plc.follow(500, None);
+    let [low, high, ..] = plc.sent.to_le_bytes();
+    let sequence_count = u16::from_le_bytes([low, high]);
+    // The same sequence count again and again keeps the connection, and is no set-point.
+    for _ in 0..20 {
+        let header = 1_u32.to_le_bytes();
+        let data = [&header[..], &plc.output].concat();
+        let (connection_id, _) = plc.open.unwrap();
+        plc.sent += 1;
+        let datagram =
+            Class1Datagram { connection_id, encapsulation_sequence: plc.sent, sequence_count, data: &data };
+        let mut bytes = vec![0; datagram.buffer_len()];
+        datagram.emit(&mut bytes).unwrap();
+        plc.rig.inject_datagram(&bytes, SocketAddrV4::new(plc.address, PLC_PORT));
+        plc.rig.run_for(RPI);
+    }
+    assert!(plc.rig.engine.assemblies()[0].owner().is_some(), "the connection lives");
+    let fault = plc.rig.engine.axes()[0].fault().map(|fault| fault.cause);
+    assert_eq!(fault, Some(FaultCause::COMMAND_LOST));
+}
+
+#[test]
+fn the_assemblies_of_the_speed_profile_run_an_axis_both_ways() {
+    let limits = "following_error = 0.5\nvelocity = 20.0\nacceleration = 100.0";
+    let text = FIXED_BOX.replace("connection_format = \"fixed\"\n", "");
+    let text = text.replacen("following_error = 0.5", limits, 1);
+    let assembly = "assembly = { layout = \"speed\" }\n\n[device.identity]";
+    let configuration = text.replacen("[device.identity]", assembly, 1);
+    let mut plc = Plc::on(Settings { configuration, ..Settings::fixed() }, 4);
+    plc.connect();
+    let speed = |plc: &Plc| {
+        let input = plc.input();
+        (input[0], input[1], i16::from_le_bytes([input[2], input[3]]))
+    };
+    let order = |plc: &mut Plc, bits: u8, rpm: i16| {
+        let [low, high] = rpm.to_le_bytes();
+        plc.output.copy_from_slice(&[bits, 0, low, high]);
+    };
+    order(&mut plc, 0x60, 120);
+    plc.run_for(100);
+    assert_eq!(speed(&plc), (0x70, 3, 0), "ready, control and reference from the network");
+    order(&mut plc, 0x61, 120);
+    plc.until(2_000, "120 rpm", |plc| plc.input()[0] == 0xF4 && plc.speed() > 2 * NANO - NANO / 50);
+    plc.run_for(100);
+    assert!((119..=121).contains(&speed(&plc).2), "{:?}", speed(&plc));
+    order(&mut plc, 0x61, 60);
+    plc.until(2_000, "60 rpm", |plc| plc.speed() < NANO + NANO / 50);
+    order(&mut plc, 0x63, 60);
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    order(&mut plc, 0x60, 60);
+    plc.run_for(200);
+    order(&mut plc, 0x62, 60);
+    plc.until(2_000, "-60 rpm", |plc| plc.speed() < -NANO + NANO / 50);
+    plc.run_for(40);
+    assert_eq!((speed(&plc).0, speed(&plc).1), (0xF8, 4));
+    plc.run = false;
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    plc.run_for(100);
+    assert_eq!((speed(&plc).0, speed(&plc).1), (0x01, 7));
+}
+
+/// Velocities and torques of the controller reach the drive as they are; each mode is taken at standstill.
+#[test]
+fn cyclic_velocities_and_torques_are_followed() {
+    const MODE: usize = 2;
+    const CYCLIC_VELOCITY: u8 = 4;
+    const CYCLIC_TORQUE: u8 = 5;
+    let configuration = configuration("{ layout = \"mixed\" }");
+    let mut plc = Plc::on(Settings { configuration, ..Settings::default() }, 64);
+    plc.connect();
+    plc.enable();
+    plc.output[MODE] = CYCLIC_VELOCITY;
+    // 4 revolutions per second squared up to 2 revolutions a second, for a second, and back to rest.
+    let mut fastest = 0;
+    for step in 0..500_i32 {
+        let velocity = (step * 16_000).min(2 * TURN).min((500 - step) * 16_000);
+        plc.output[4..8].copy_from_slice(&velocity.to_le_bytes());
+        plc.scan();
+        fastest = fastest.max(plc.speed());
+        if step == 250 {
+            assert!((plc.speed() - 2 * NANO).abs() < NANO / 50, "{}", plc.speed());
+            let shown = i32::from_le_bytes(plc.input()[16..20].try_into().unwrap());
+            assert!((shown - 2 * TURN).abs() < TURN / 50, "{shown}");
+            // Another mode in motion: the axis brakes first.
+            assert_eq!(plc.refusal(), Refusal::NONE);
+        }
+    }
+    assert!(fastest < 2 * NANO + NANO / 20, "{fastest}");
+    plc.output[4..8].copy_from_slice(&0_i32.to_le_bytes());
+    for _ in 0..50 {
+        plc.scan();
+    }
+    assert!(plc.is(Status::ENABLED | Status::STANDSTILL), "{:?}", plc.status());
+
+    plc.output[MODE] = CYCLIC_TORQUE;
+    for _ in 0..10 {
+        plc.scan();
+    }
+    plc.output[20..22].copy_from_slice(&100_i16.to_le_bytes());
+    for _ in 0..25 {
+        plc.scan();
+    }
+    let torque = plc.rig.drive(0).actual().torque.get();
+    assert!((torque - 100_000).abs() < 5_000, "10 % of the rated torque: {torque}");
+    assert!(plc.speed() > 0, "{}", plc.speed());
+    // Nothing but the drive itself brakes it: STOP takes the torque away.
+    plc.word(Control::ENABLE | Control::STOP);
+    plc.until(3_000, "the end of the torque", |plc| plc.rig.torque_free());
+    assert!(!plc.is(Status::ENABLED), "{:?}", plc.status());
+    plc.word(Control::ENABLE);
+    plc.stays_off();
+}
