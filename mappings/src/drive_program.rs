@@ -428,6 +428,22 @@ impl DriveProgram {
         self.parameter(parameter).is_some_and(|held| held.from_drive.is_some())
     }
 
+    /// What is missing where the gateway cannot go by a parameter: a key of the configuration, or a value of the drive.
+    #[must_use]
+    pub fn lacks(&self, parameter: Parameter) -> &'static str {
+        match parameter {
+            Parameter::OVER_SPEED_USER_LIMIT | Parameter::ZERO_SPEED => {
+                "`rated_speed` of `[axis.motor]` is not configured"
+            }
+            Parameter::BUS_OVERVOLTAGE_USER_LIMIT | Parameter::BUS_UNDERVOLTAGE_USER_LIMIT
+                if self.datum(Parameter::BUS_NOMINAL_VOLTAGE).is_none() =>
+            {
+                "`bus_voltage` of `[axis.converter]` is not configured"
+            }
+            _ => "the drive does not show what it goes by",
+        }
+    }
+
     /// Rated velocity of the motor as a velocity of the axis, by the nameplate in the configuration; `None` where nobody knows it.
     #[must_use]
     pub fn rated_velocity(&self) -> Option<Velocity> {

@@ -155,7 +155,7 @@ impl Mapping {
                 (Truth::Absent, format!("the drive has no {name}"))
             }
             (None, Missing::Device) if !drive.can_go_by(parameter) => {
-                (Truth::Absent, "the drive does not show what it goes by".to_owned())
+                (Truth::Absent, drive.lacks(parameter).to_owned())
             }
             (None, Missing::Device) if parameter == Parameter::STOPPING_TORQUE => {
                 (Truth::Compared, "the torque limits of the drive".to_owned())

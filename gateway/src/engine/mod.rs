@@ -28,6 +28,7 @@ pub mod cyclic;
 pub mod device;
 pub mod direct;
 mod ending;
+pub mod generator;
 pub mod local;
 pub mod north;
 pub mod notice;
@@ -45,6 +46,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::{TimeBase, TimeSample};
 
 use self::assembly::AssemblyChannel;
+use self::axis::nameplate::Difference;
 use self::axis::rest::Unrested;
 use self::axis::{AxisChannel, Owner};
 use self::bus::sercos::SercosBus;
@@ -510,10 +512,7 @@ fn hand_on(
     let data = answer.data().map(|data| data.as_slice());
     let axis = &mut axes[answer.axis];
     match answer.purpose {
-        Purpose::Attribute { .. }
-        | Purpose::Original { .. }
-        | Purpose::Setting(_)
-        | Purpose::Nameplate(_) => {
+        Purpose::Attribute { .. } | Purpose::Original { .. } | Purpose::Setting(_) => {
             norths.devices.iter_mut().any(|channel| channel.answer(&answer, mapping, axes, notice));
         }
         Purpose::LocalParameter(ticket) => {
@@ -532,6 +531,14 @@ fn hand_on(
         Purpose::DiagnosticMessage => {
             if let Some(said) = axis.diagnostic_message_read(answer.item, data.ok()) {
                 notice(Notice::DriveSays { axis: u8::try_from(answer.axis).unwrap_or(u8::MAX), said });
+            }
+        }
+        Purpose::Nameplate => {
+            if let Some(Difference { parameter, configured, held }) =
+                axis.nameplate_value_read(answer.item, data.ok())
+            {
+                let axis = u8::try_from(answer.axis).unwrap_or(u8::MAX);
+                notice(Notice::OtherNameplate { axis, parameter, configured, held });
             }
         }
         Purpose::SlowValue => axis.slow_value_read(now, answer.item, data.ok()),

@@ -14,6 +14,7 @@ use profile_cip::devicenet::wire::MacId;
 use profile_cip::wire::motion::codes::{ClearingEvent, NodeAlarm, NodeFault};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::mode::ModeSelection;
+use profile_generic::parameter::Parameter;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 use profile_sercos::master::event::{Event, SlaveId};
@@ -372,12 +373,12 @@ pub enum Notice {
     OtherNameplate {
         /// Number of the axis.
         axis: u8,
-        /// The attribute.
-        attribute: u16,
-        /// What the configuration has.
-        configured: Option<Number>,
+        /// The value.
+        parameter: Parameter,
+        /// What the configuration has, in the unit of the parameter.
+        configured: i64,
         /// What the drive has.
-        held: Option<Number>,
+        held: i64,
     },
     /// The drive did not take back what it had before the last controller: it keeps what that has set.
     NotReturned {
@@ -694,11 +695,9 @@ impl fmt::Display for Notice {
             Self::NotEqual { attribute, .. } => {
                 write!(f, "attribute {attribute} is not what the drive has, and only the drive can change that")
             }
-            Self::OtherNameplate { attribute, configured: Some(configured), held: Some(held), .. } => {
-                write!(f, "attribute {attribute}: the nameplate in the configuration has {configured}, the drive {held}, which counts")
-            }
-            Self::OtherNameplate { attribute, .. } => {
-                write!(f, "attribute {attribute}: the nameplate in the configuration is not what the drive has, which counts")
+            Self::OtherNameplate { parameter, configured, held, .. } => {
+                let unit = parameter.row().map_or("", |row| row.quantity.unit());
+                write!(f, "{parameter}: the nameplate in the configuration has {configured} {unit}, the drive {held} {unit}, which counts")
             }
             Self::NotReturned { item, failure, .. } => {
                 let why = match failure {

@@ -280,6 +280,21 @@ impl Plc {
     }
 }
 
+/// What the nameplate of an axis says is compared with its drive here too.
+#[test]
+fn another_motor_than_the_configured_one_is_reported() {
+    let nameplate = "instance = 1\nmotor = { type = \"rotary-permanent-magnet\", rated_current = 9.9 }\n";
+    let configuration = configuration("{}").replacen("instance = 1\n", nameplate, 1);
+    let mut plc = Plc::on(Settings { configuration, ..Settings::default() }, 32);
+    plc.run_for(200);
+    let said = plc.rig.told();
+    assert_eq!(
+        said.matches("motor_rated_current: the nameplate in the configuration has 9900000 uA").count(),
+        1,
+        "{said}"
+    );
+}
+
 const ALL: Control = Control::ENABLE.union(Control::START).union(Control::RESET);
 
 #[test]
@@ -524,6 +539,66 @@ fn orders_that_cannot_be_carried_out_are_refused_with_their_reason() {
     plc.output[16..18].copy_from_slice(&(Control::ENABLE | Control::START).bits().to_le_bytes());
     plc.run_for(100);
     assert_eq!(Refusal(plc.input()[23]), Refusal::BEYOND_LIMIT);
+}
+
+impl Plc {
+    /// Enabled in mode 2, with a drive of these modes and an axis with these limits of its travel, in revolutions.
+    fn at_a_velocity(modes: &str, (min, max): (i32, i32)) -> Self {
+        const MODE: usize = 2;
+        const VELOCITY: u8 = 2;
+        let modes = format!("address = 1\nmodes = [\"{modes}\"]");
+        let ends = format!("acceleration = 100.0\nposition_min = {min}.0\nposition_max = {max}.0");
+        let text = configuration("{ layout = \"mixed\" }");
+        let text = text.replacen("acceleration = 100.0", &ends, 1).replacen("address = 1", &modes, 1);
+        let mut plc = Self::on(Settings { configuration: text, ..Settings::default() }, 64);
+        plc.connect();
+        plc.output[MODE] = VELOCITY;
+        plc.velocity(0);
+        plc.enable();
+        plc
+    }
+
+    /// Velocity of the turntable in the layout `mixed`, in counts, and 10 revolutions per second squared.
+    fn velocity(&mut self, velocity: i32) {
+        self.output[4..8].copy_from_slice(&velocity.to_le_bytes());
+        self.output[16..20].copy_from_slice(&(10 * TURN).to_le_bytes());
+    }
+}
+
+/// A velocity toward a limit of the travel ends ahead of it, in velocity control too; behind the limit it is refused, and the axis stays
+/// where it is.
+#[test]
+fn a_velocity_ends_ahead_of_the_limit_of_the_travel() {
+    for modes in ["position", "velocity"] {
+        let mut plc = Plc::at_a_velocity(modes, (-2, 3));
+        for (velocity, end) in [(2 * TURN, 3 * NANO), (-2 * TURN, -2 * NANO)] {
+            plc.velocity(velocity);
+            let mut furthest = plc.place();
+            for _ in 0..1_000 {
+                plc.scan();
+                furthest = if velocity > 0 { furthest.max(plc.place()) } else { furthest.min(plc.place()) };
+            }
+            let beyond = (furthest - end) * i64::from(velocity.signum());
+            assert!((-NANO / 10..NANO / 1_000).contains(&beyond), "{modes}: {furthest}, the limit is {end}");
+            assert!(plc.is(Status::ENABLED | Status::STANDSTILL), "{modes}: {:?}", plc.status());
+        }
+    }
+}
+
+/// The end is behind the axis: a velocity away from it must not bring the axis back there.
+#[test]
+fn a_velocity_away_from_a_limit_behind_the_axis_is_refused() {
+    for modes in ["position", "velocity"] {
+        let mut plc = Plc::at_a_velocity(modes, (-100, -1));
+        plc.velocity(TURN);
+        plc.run_for(500);
+        assert_eq!(plc.refusal(), Refusal::BEYOND_LIMIT, "{modes}");
+        assert!(plc.place().abs() < NANO / 100, "{modes}: {}", plc.place());
+        plc.velocity(-TURN);
+        plc.run_for(500);
+        assert_eq!(plc.refusal(), Refusal::NONE, "{modes}");
+        assert!(plc.place() < -NANO / 4, "{modes}: {}", plc.place());
+    }
 }
 
 #[test]

@@ -58,8 +58,9 @@ fn data_of_the_configuration_are_read_and_compared() {
         let said = "attribute 1327 cannot be set to 1.375: the configuration has 1.25";
         assert!(rig.told().contains(said), "{bus}: {}", rig.told());
         // That is said once, and of nothing else.
+        let held = (current * 1_000_000.0).round();
         let other = format!(
-            "attribute 1319: the nameplate in the configuration has 9.9, the drive {current}, which counts"
+            "motor_rated_current: the nameplate in the configuration has 9900000 uA, the drive {held} uA, which counts"
         );
         assert_eq!(rig.told().matches(&other).count(), 1, "{bus}: {}", rig.told());
         let others = rig.told().matches("the nameplate in the configuration").count();

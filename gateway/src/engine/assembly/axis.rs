@@ -20,31 +20,16 @@ use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
-use profile_generic::sequence::SequenceStep;
 use profile_generic::state::{DriveState, Request};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeBase;
 
 use super::AssemblyAxis;
-use super::generator::{Generator, POSITION, VELOCITY};
 use crate::engine::axis::{
-    AxisChannel, Intent, NorthPoints, Owner, START_TIME_OUT, StopSettings, Target, Updates, Wish,
+    AxisChannel, Intent, NorthPoints, Owner, READY_TIME_OUT, START_TIME_OUT, StopSettings, Target, Updates,
+    Wish,
 };
-use crate::engine::local::UPDATE_PERIOD;
-
-/// How long an enable waits for the drive to become ready.
-const READY_TIME_OUT: DurationNs = DurationNs::from_secs(2);
-
-/// How long an axis has to be slower than its standstill speed at its target.
-const REST_TIME: DurationNs = DurationNs::from_millis(20);
-
-/// Largest distance from the target at which a movement is done: a hundredth of a unit, or this part of the following error
-/// limit if that is more.
-const IN_POSITION: i64 = 10_000_000;
-const IN_POSITION_DIVISOR: i64 = 20;
-
-/// How set-points of the generator are handed to the axis.
-const GENERATED: Updates = Updates { period: UPDATE_PERIOD, may_miss: 4, first: TargetUpdate::Interpolate };
+use crate::engine::generator::{self, Misfit, POSITION, ProfileGenerator, Standstill};
 
 /// Set-points of the controller that may be missed before the command counts as lost.
 const MAY_MISS: u32 = 4;
@@ -76,7 +61,7 @@ enum Source {
     /// Nowhere yet: it holds the position at which it was enabled.
     None,
     /// The generator of the gateway.
-    Generator(Generator),
+    Generator(ProfileGenerator),
     /// The controller.
     Cyclic,
 }
@@ -106,7 +91,7 @@ pub(super) struct PlcAxis {
     begun: Option<MonotonicTime>,
     /// It was in operation since it was enabled.
     has_operated: bool,
-    slow_since: Option<MonotonicTime>,
+    standstill: Standstill,
     connected: bool,
     toggle: bool,
     sampled_at: MonotonicTime,
@@ -130,7 +115,7 @@ impl PlcAxis {
             enabling: None,
             begun: None,
             has_operated: false,
-            slow_since: None,
+            standstill: Standstill::new(),
             connected: false,
             toggle: false,
             sampled_at: MonotonicTime::ZERO,
@@ -149,11 +134,11 @@ impl PlcAxis {
         inhibits.set(Inhibits::LIMIT_SWITCHES_NOT_TOLD, axis.misses_limit_switches());
         axis.set_inhibits(now, system, inhibits);
         axis.retry_wish(now, system);
-        self.slow_since = axis.stands().then(|| self.slow_since.unwrap_or(now));
-        if !is_operating(axis) {
+        self.standstill.watch(now, axis);
+        if !axis.operates() {
             (self.source, self.followed) = (Source::None, None);
         }
-        let known = Axis { faulted: is_faulted(axis), operating: is_operating(axis) };
+        let known = Axis { faulted: is_faulted(axis), operating: axis.operates() };
         let before = self.handshake.state();
         let (reaction, refusal) = self.handshake.step(around.link, output.control, known);
         if before == State::Enabled && known.faulted {
@@ -187,11 +172,11 @@ impl PlcAxis {
             self.refusal = refusal;
         }
         self.enable(around, axis);
-        if self.handshake.state() != State::Enabled && !is_faulted(axis) && is_operating(axis) {
+        if self.handshake.state() != State::Enabled && !is_faulted(axis) && axis.operates() {
             // Held after a lost command, and the fault was reset: nobody wants the torque.
             self.disable(around, axis);
         }
-        if self.handshake.state() == State::Enabled && is_operating(axis) {
+        if self.handshake.state() == State::Enabled && axis.operates() {
             self.operate(around, axis, output, reaction);
         }
         self.generate(around, axis);
@@ -236,7 +221,7 @@ impl PlcAxis {
         if self.handshake.state() != State::Enabled {
             return;
         }
-        self.has_operated |= is_operating(axis);
+        self.has_operated |= axis.operates();
         let Some(since) = self.enabling else { return };
         let late = match self.begun {
             None if axis.state() == DriveState::Ready => {
@@ -266,7 +251,7 @@ impl PlcAxis {
         reaction: Reaction,
     ) {
         if output.mode != self.mode {
-            if !self.rests(around.now.0) {
+            if !self.standstill.is_reached(around.now.0) {
                 self.refusal = Refusal::MODE;
                 return self.brake(around, axis);
             }
@@ -312,13 +297,10 @@ impl PlcAxis {
         let (Some(target), Some(velocity)) = (output.position, output.velocity) else {
             return Err(Refusal::MODE);
         };
-        if !has(axis, POSITION) {
+        if !generator::has(axis, POSITION) {
             return Err(Refusal::MODE);
         }
-        if velocity <= Velocity::ZERO {
-            return Err(Refusal::NOT_POSITIVE);
-        }
-        let acceleration = checked(axis, velocity, output.acceleration)?;
+        let acceleration = generator::acceleration(axis, velocity, given(output)).map_err(refusal)?;
         let here = match &self.source {
             Source::Generator(generator) => generator.profile.position(),
             Source::None | Source::Cyclic => axis.feedback().position,
@@ -327,12 +309,7 @@ impl PlcAxis {
             true => here.get().checked_add(target.get()).map(Position).ok_or(Refusal::VALUE)?,
             false => target,
         };
-        let limits = axis.limits();
-        let beyond = limits.position_max.is_some_and(|end| target > end)
-            || limits.position_min.is_some_and(|end| target < end);
-        if beyond {
-            return Err(Refusal::BEYOND_LIMIT);
-        }
+        generator::target(axis, target, velocity).map_err(refusal)?;
         let mut generator = self.generator(around, axis, POSITION, acceleration);
         generator.profile.to_position(target, velocity, acceleration);
         self.source = Source::Generator(generator);
@@ -346,26 +323,22 @@ impl PlcAxis {
             self.refusal = Refusal::MODE;
             return;
         };
-        let mode = [POSITION, VELOCITY].into_iter().find(|mode| has(axis, *mode));
-        let (Some(mode), Ok(acceleration)) = (mode, checked(axis, velocity, output.acceleration)) else {
-            let why = checked(axis, velocity, output.acceleration).err();
-            self.refusal = why.unwrap_or(Refusal::MODE);
-            return self.brake(around, axis);
+        let acceleration = match generator::acceleration(axis, velocity, given(output)) {
+            Ok(acceleration) if self.followed == Some((velocity, acceleration)) => return,
+            acceleration => acceleration,
         };
-        if self.followed == Some((velocity, acceleration)) {
-            return;
-        }
-        let mut generator = self.generator(around, axis, mode, acceleration);
-        let limits = axis.limits();
-        let end = if velocity < Velocity::ZERO { limits.position_min } else { limits.position_max };
-        match end.filter(|_| mode == POSITION && velocity != Velocity::ZERO) {
-            // It brakes ahead of the end of its travel.
-            Some(end) => {
-                let speed = Velocity(velocity.get().saturating_abs());
-                generator.profile.to_position(end, speed, acceleration);
+        let fit = acceleration.and_then(|acceleration| {
+            Ok((acceleration, generator::run_mode(axis)?, generator::end_of_travel(axis, velocity)?))
+        });
+        let (acceleration, mode, end) = match fit {
+            Ok(fit) => fit,
+            Err(misfit) => {
+                self.refusal = refusal(misfit);
+                return self.brake(around, axis);
             }
-            None => generator.profile.to_velocity(velocity, acceleration),
-        }
+        };
+        let mut generator = self.generator(around, axis, mode, acceleration);
+        generator.run(velocity, acceleration, end);
         self.source = Source::Generator(generator);
         self.followed = Some((velocity, acceleration));
         if self.refusal != Refusal::BOTH_DIRECTIONS {
@@ -387,7 +360,7 @@ impl PlcAxis {
         };
         self.sequence = self.sequence.wrapping_add(1);
         self.source = Source::Cyclic;
-        let Some(command) = set_points(selection, output).filter(|_| has(axis, selection)) else {
+        let Some(command) = set_points(selection, output).filter(|_| generator::has(axis, selection)) else {
             self.refusal = Refusal::MODE;
             return axis.refuse_set_points(now, system, self.sequence, FaultCause::ILLEGAL_MODE);
         };
@@ -411,14 +384,14 @@ impl PlcAxis {
         let mode = match &self.source {
             Source::Generator(generator) => Some(generator.mode),
             // It holds the position at which it was enabled.
-            Source::None if self.rests(around.now.0) => return,
-            Source::None | Source::Cyclic => [POSITION, VELOCITY].into_iter().find(|mode| has(axis, *mode)),
+            Source::None if self.standstill.is_reached(around.now.0) => return,
+            Source::None | Source::Cyclic => generator::run_mode(axis).ok(),
         };
         let torque = self.mode == mode::CYCLIC_TORQUE;
         // A generator in progress goes on with its own acceleration.
         let acceleration = match &self.source {
             Source::Generator(_) => Some(Acceleration(1)),
-            Source::None | Source::Cyclic => checked(axis, Velocity::ZERO, None).ok(),
+            Source::None | Source::Cyclic => generator::acceleration(axis, Velocity::ZERO, None).ok(),
         };
         let (Some(mode), Some(acceleration), false) = (mode, acceleration, torque) else {
             // Nothing but the drive itself brakes an axis in torque control, or one without a known acceleration.
@@ -437,12 +410,12 @@ impl PlcAxis {
         axis: &mut AxisChannel,
         mode: ModeSelection,
         braking: Acceleration,
-    ) -> Generator {
+    ) -> ProfileGenerator {
         match self.source {
             Source::Generator(generator) if generator.mode == mode => generator,
             _ => {
-                axis.keep_updates(GENERATED);
-                Generator::from_axis(around.now.0, axis, mode, braking)
+                axis.keep_updates(generator::UPDATES);
+                ProfileGenerator::from_axis(around.now.0, axis, mode, braking)
             }
         }
     }
@@ -450,17 +423,15 @@ impl PlcAxis {
     /// Sends the set-points of the generator that are due, and sees whether the movement is done.
     fn generate(&mut self, around: &Around<'_>, axis: &mut AxisChannel) {
         let Source::Generator(mut generator) = self.source else { return };
-        while let Some(command) = generator.poll(around.now.0) {
+        while let Some(command) = generator.poll(around.now.0, axis) {
             self.send(around, axis, command);
         }
         self.source = Source::Generator(generator);
         if let Some(target) = self.target
             && generator.profile.is_done()
-            && self.rests(around.now.0)
+            && self.standstill.is_reached(around.now.0)
         {
-            let bound = axis.limits().following_error.map_or(0, |limit| limit.get() / IN_POSITION_DIVISOR);
-            let bound = bound.max(IN_POSITION).unsigned_abs();
-            self.done = axis.feedback().position.get().abs_diff(target.get()) <= bound;
+            self.done = generator::is_in_position(axis, target);
         }
     }
 
@@ -468,10 +439,6 @@ impl PlcAxis {
         let (now, system) = around.now;
         self.sequence = self.sequence.wrapping_add(1);
         axis.from_north(now, system, &AxisCommand { sequence: self.sequence, ..command });
-    }
-
-    fn rests(&self, now: MonotonicTime) -> bool {
-        self.slow_since.is_some_and(|since| now.since(since) >= REST_TIME)
     }
 
     // ---- to the controller -----------------------------------------------------------------------------------------
@@ -490,7 +457,7 @@ impl PlcAxis {
         let mut status = Status::empty();
         for (bit, on) in [
             (Status::READY, axis.state() == DriveState::Ready),
-            (Status::ENABLED, is_operating(axis) && !held),
+            (Status::ENABLED, axis.operates() && !held),
             (Status::FAULT, is_faulted(axis)),
             (Status::MOVING, moving),
             (Status::DONE, self.done),
@@ -562,39 +529,23 @@ fn set_points(selection: ModeSelection, output: &AxisOutput) -> Option<AxisComma
     Some(command)
 }
 
-/// Checks a velocity and an acceleration against the limits of the axis; returns the acceleration to use.
-fn checked(
-    axis: &AxisChannel,
-    velocity: Velocity,
-    acceleration: Option<Acceleration>,
-) -> Result<Acceleration, Refusal> {
-    let limits = axis.limits();
-    let beyond = |limit: Velocity| velocity.get().unsigned_abs() > limit.get().unsigned_abs();
-    if limits.velocity.is_some_and(beyond) {
-        return Err(Refusal::TOO_FAST);
-    }
-    let given = acceleration.filter(|given| *given != Acceleration::ZERO);
-    let configured = limits.acceleration.or(axis.stop_settings().deceleration);
-    let acceleration = given.or(configured).ok_or(Refusal::NOT_POSITIVE)?;
-    if acceleration <= Acceleration::ZERO {
-        return Err(Refusal::NOT_POSITIVE);
-    }
-    match limits.acceleration {
-        Some(limit) if acceleration > limit => Err(Refusal::TOO_STEEP),
-        _ => Ok(acceleration),
+/// The acceleration that the controller gives; zero means the configured one.
+fn given(output: &AxisOutput) -> Option<Acceleration> {
+    output.acceleration.filter(|given| *given != Acceleration::ZERO)
+}
+
+fn refusal(misfit: Misfit) -> Refusal {
+    match misfit {
+        Misfit::Mode(_) => Refusal::MODE,
+        Misfit::NoAcceleration | Misfit::NotPositive => Refusal::NOT_POSITIVE,
+        Misfit::TooFast(_) => Refusal::TOO_FAST,
+        Misfit::TooSteep(_) => Refusal::TOO_STEEP,
+        Misfit::Beyond(_) => Refusal::BEYOND_LIMIT,
     }
 }
 
 fn is_cyclic(mode: u8) -> bool {
     matches!(mode, mode::CYCLIC_POSITION | mode::CYCLIC_VELOCITY | mode::CYCLIC_TORQUE)
-}
-
-fn has(axis: &AxisChannel, mode: ModeSelection) -> bool {
-    axis.south().is_some_and(|program| program.has_mode(mode))
-}
-
-fn is_operating(axis: &AxisChannel) -> bool {
-    axis.state() == DriveState::Operating && axis.sequence_step() == SequenceStep::Running
 }
 
 fn is_faulted(axis: &AxisChannel) -> bool {

@@ -13,7 +13,6 @@
 
 mod axis;
 mod connections;
-mod generator;
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
@@ -123,13 +122,8 @@ impl AssemblyChannel {
     /// What the Network Status LED of the device shows.
     #[must_use]
     pub fn network_status(&self) -> Indication {
-        visualization::network_status(&NetworkCondition {
-            self_test: false,
-            address: true,
-            duplicate: false,
-            connected: self.connections.any() || self.link.explicit_connections() > 0,
-            timed_out: self.lost,
-        })
+        let connected = self.connections.any() || self.link.explicit_connections() > 0;
+        visualization::network_status(&NetworkCondition::listening(connected, self.lost))
     }
 
     /// Sets on each axis of the device whether a controller is connected.

@@ -37,6 +37,7 @@ mod heat;
 mod history;
 mod hookup;
 mod link;
+pub(super) mod nameplate;
 mod north;
 mod orders;
 mod overtravel;
@@ -102,6 +103,9 @@ use self::supervision::Supervision;
 
 /// How long a drive may take from the enable to following set-points; a commutation search may take seconds.
 pub const START_TIME_OUT: DurationNs = DurationNs::from_secs(10);
+
+/// How long an enable waits for the drive to become ready.
+pub const READY_TIME_OUT: DurationNs = DurationNs::from_secs(2);
 
 /// How long a drive may take to come to rest before its torque is taken away.
 pub const STOP_TIME_OUT: DurationNs = DurationNs::from_secs(30);
@@ -193,6 +197,8 @@ pub struct AxisChannel {
     data: Vec<(Parameter, i64)>,
     /// What is known of the values of the drive that change slowly.
     slow: slow_values::SlowValues,
+    /// Whether the drive is of the motor that the configuration says.
+    nameplate: nameplate::NameplateCheck,
     /// How warm it is by its load.
     heats: heat::Heats,
 }
@@ -231,6 +237,7 @@ impl AxisChannel {
             rescaled: false,
             data: Vec::new(),
             slow: slow_values::SlowValues::default(),
+            nameplate: nameplate::NameplateCheck::default(),
             heats: heat::Heats::default(),
         }
     }
@@ -431,6 +438,12 @@ impl AxisChannel {
             && self.start_stop.stands(self.feedback.velocity)
     }
 
+    /// Whether it follows set-points: the drive operates, and its start sequence has ended.
+    #[must_use]
+    pub fn operates(&self) -> bool {
+        self.state() == DriveState::Operating && self.sequence_step() == SequenceStep::Running
+    }
+
     /// Whether there is nothing to be waited for: it stands without torque, or will not be seen to.
     #[must_use]
     pub fn has_stopped(&self) -> bool {
@@ -488,6 +501,7 @@ impl AxisChannel {
         let constants = [Parameter::MOTOR_THERMAL_TIME, Parameter::DRIVE_THERMAL_TIME].map(constant);
         self.heats.set_constants(constants);
         self.procedure.restart(program.procedures());
+        self.nameplate.begin(&self.data, &program);
         self.link.connect(program);
         self.captures.restart();
         self.drive.action = Action::TorqueOff;
@@ -548,6 +562,25 @@ impl AxisChannel {
     /// The drive has answered, or does not give it.
     pub(in crate::engine) fn slow_value_read(&mut self, now: MonotonicTime, item: Item, data: Option<&[u8]>) {
         self.slow.take(now, item, data, self.link.program());
+    }
+
+    /// The value of the nameplate that should be read now, to compare it.
+    pub(in crate::engine) fn wanted_nameplate_value(&self) -> Option<Item> {
+        self.nameplate.wanted(self.south()?)
+    }
+
+    /// What was wanted is on its way.
+    pub(in crate::engine) fn nameplate_value_requested(&mut self) {
+        self.nameplate.ask();
+    }
+
+    /// The drive has answered, or does not give it. Returns how it differs from the nameplate.
+    pub(in crate::engine) fn nameplate_value_read(
+        &mut self,
+        item: Item,
+        data: Option<&[u8]>,
+    ) -> Option<nameplate::Difference> {
+        self.nameplate.take(item, data, self.link.program())
     }
 
     // ---- tests, captures, procedures ---------------------------------------------------------------------------

@@ -50,8 +50,6 @@ pub enum Purpose {
     },
     /// A setting of a drive that a cyclic list of a controller needs, with the index of the device of the axis.
     Setting(u8),
-    /// A value of a drive that the nameplate in the configuration says too, with the index of the device of the axis.
-    Nameplate(u8),
     /// Local control's access to a parameter, by its ticket.
     LocalParameter(u32),
     /// A register's access to a parameter, by its ticket.
@@ -62,6 +60,8 @@ pub enum Purpose {
     DiagnosticMessage,
     /// A value that changes slowly and that a limit is watched by.
     SlowValue,
+    /// A value that the nameplate in the configuration says too.
+    Nameplate,
     /// The drive's fault reset.
     FaultReset,
     /// Capturing events, with the generation of the axis's captures.
@@ -411,7 +411,7 @@ impl<T: Copy> Places<T> {
 }
 
 /// Starts the accesses that an axis wants outside the cyclic data: words with the cause of a fault or warning, fault reset,
-/// values that are watched, captures and procedures; one of each at a time.
+/// values that are watched or compared, captures and procedures; one of each at a time.
 fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Access, Purpose) -> bool) {
     if axis.wants_drive_reset() {
         let sent = match axis.south().and_then(|program| program.command_of(Action::ResetFault)) {
@@ -437,6 +437,11 @@ fn ask(now: MonotonicTime, axis: &mut AxisChannel, access: &mut dyn FnMut(&Acces
         && access(&Access::read(item), Purpose::SlowValue)
     {
         axis.slow_value_requested(now, place);
+    }
+    if let Some(item) = axis.wanted_nameplate_value()
+        && access(&Access::read(item), Purpose::Nameplate)
+    {
+        axis.nameplate_value_requested();
     }
     if let Some((wanted, part, generation)) = axis.capture_access()
         && access(&wanted, Purpose::Capture(part, generation))

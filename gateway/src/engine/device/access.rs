@@ -10,7 +10,6 @@ use profile_generic::time::MonotonicTime;
 
 use super::cyclic_values::CyclicValues;
 use super::encoder;
-use super::nameplate::NameplateCheck;
 use super::originals::Originals;
 use super::refusal::{parameter_refusal, refusal};
 use super::scaling::signal_octets;
@@ -44,8 +43,6 @@ pub(super) struct Accesses {
     originals: Originals,
     /// What the computed values of cyclic lists need.
     pub cyclic: CyclicValues,
-    /// Whether the drive is of the motor that the configuration says.
-    pub nameplate: NameplateCheck,
 }
 
 /// An access to a computed value.
@@ -192,8 +189,6 @@ impl Accesses {
         self.give_back(on, buses);
         let purpose = Purpose::Setting(on.number);
         self.cyclic.advance(now, on.axis, |request| buses.access(axis_number, request, purpose));
-        self.nameplate
-            .advance(on.axis, |request| buses.access(axis_number, request, Purpose::Nameplate(number)));
         let original = on.original(false);
         let (device, tables) = (&mut *on.device, &mapping.cip);
         let originals = &mut self.originals;

@@ -15,7 +15,6 @@ use super::axis::CipAxis;
 use super::reactions;
 use super::scaling::{Scaling, signal_octets};
 use super::stopping::{Settings, StopDefaults, Stopping};
-use crate::engine::access::{AccessFailure, Data};
 use crate::engine::axis::{AxisChannel, Owner, Reactions, Updates};
 use crate::engine::notice::Notice;
 use crate::mapping::{CipProgram, CipScaling, Mapping};
@@ -156,17 +155,6 @@ impl Member {
         if !winds_down(device, place, axis) && axis.owner() != Owner::Local {
             axis.set_stop_settings(settings);
         }
-    }
-
-    /// Takes the drive's answer to a value that the nameplate says too.
-    pub fn take_nameplate(
-        &mut self,
-        result: Result<&Data, AccessFailure>,
-        axes: &[AxisChannel],
-        notice: &mut dyn FnMut(Notice),
-    ) {
-        let axis = (&axes[self.axis], self.number());
-        self.accesses.nameplate.take(result, axis, self.scaling.attributes(), notice);
     }
 
     /// Reports a fault of the axis that the controller knows as one of the communications node, once.

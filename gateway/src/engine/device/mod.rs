@@ -5,7 +5,6 @@ mod axis;
 mod cyclic_values;
 mod encoder;
 mod member;
-mod nameplate;
 mod originals;
 mod reactions;
 mod refusal;
@@ -186,17 +185,12 @@ impl DeviceChannel {
         self.device.connection().map(|connection| DurationNs::from_micros(i64::from(connection.rpi_us)))
     }
 
-    /// What the Network Status LED of the device shows. The box tests nothing of itself before it speaks, has the address it
-    /// listens at, and does not look for another station with it.
+    /// What the Network Status LED of the device shows.
     #[must_use]
     pub fn network_status(&self) -> Indication {
-        visualization::network_status(&NetworkCondition {
-            self_test: false,
-            address: true,
-            duplicate: false,
-            connected: self.device.connection().is_some() || self.link.explicit_connections() > 0,
-            timed_out: self.device.is_connection_lost(),
-        })
+        let connected = self.device.connection().is_some() || self.link.explicit_connections() > 0;
+        let timed_out = self.device.is_connection_lost();
+        visualization::network_status(&NetworkCondition::listening(connected, timed_out))
     }
 
     /// The grid of the controller's updates in system time, if it and an axis for which `is_meant` holds work synchronously.
@@ -337,10 +331,8 @@ impl DeviceChannel {
         axes: &[AxisChannel],
         notice: &mut dyn FnMut(Notice),
     ) -> bool {
-        let (Purpose::Attribute { device, .. }
-        | Purpose::Original { device, .. }
-        | Purpose::Setting(device)
-        | Purpose::Nameplate(device)) = answer.purpose
+        let (Purpose::Attribute { device, .. } | Purpose::Original { device, .. } | Purpose::Setting(device)) =
+            answer.purpose
         else {
             return false;
         };
@@ -361,7 +353,6 @@ impl DeviceChannel {
             Purpose::Setting(_) => {
                 member.accesses.cyclic.take(answer.data(), &axes[answer.axis]);
             }
-            Purpose::Nameplate(_) => member.take_nameplate(answer.data(), axes, notice),
             _ => {}
         }
         true

@@ -12,22 +12,18 @@
 //! ```
 
 use profile_generic::fault::{FaultCause, Reaction};
-use profile_generic::image::{AxisCommand, CommandSet, StatusBits};
-use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
-use profile_generic::quantity::{Acceleration, Position, Velocity};
-use profile_generic::sequence::SequenceStep;
+use profile_generic::image::{AxisCommand, StatusBits};
+use profile_generic::mode::{ModeSelection, OperatingMode};
+use profile_generic::quantity::Acceleration;
 use profile_generic::state::{Action, DriveState, Report, Request};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
+use super::JOG_TIME;
 use super::order::{ClientId, Failure, Generator, Jog, Move, Order};
-use super::profile::MotionProfile;
-use super::{JOG_TIME, UPDATE_PERIOD, UPDATES};
 use crate::engine::axis::{
-    AxisChannel, Intent, RESET_TIME_OUT, Reactions, START_TIME_OUT, STOP_TIME_OUT, Wish,
+    AxisChannel, Intent, READY_TIME_OUT, RESET_TIME_OUT, Reactions, START_TIME_OUT, STOP_TIME_OUT, Wish,
 };
-
-/// How long an enable waits for the drive to become ready.
-const READY_TIME_OUT: DurationNs = DurationNs::from_secs(2);
+use crate::engine::generator::{self, Misfit, POSITION, ProfileGenerator, Standstill, UPDATES};
 
 /// Longest homing.
 const HOMING_TIME_OUT: DurationNs = DurationNs::from_secs(600);
@@ -35,21 +31,6 @@ const HOMING_TIME_OUT: DurationNs = DurationNs::from_secs(600);
 /// How long an axis may take to settle at its target after the end of the profile.
 const SETTLE_TIME_OUT: DurationNs = DurationNs::from_secs(5);
 
-/// How long an axis has to be slower than its standstill speed to count as standing.
-const REST_TIME: DurationNs = DurationNs::from_millis(20);
-
-/// Largest distance from the target at which a movement counts as completed: a hundredth of a unit, or this part of the following error
-/// limit if that is more.
-const IN_POSITION: Position = Position(10_000_000);
-const IN_POSITION_DIVISOR: i64 = 20;
-
-/// Most set-points computed in one call; after a longer pause the profile continues from now.
-const CATCH_UP_MAX: u32 = 4;
-
-const POSITION: ModeSelection =
-    ModeSelection { mode: OperatingMode::Position, interpolation: InterpolationSource::Controller };
-const VELOCITY: ModeSelection =
-    ModeSelection { mode: OperatingMode::Velocity, interpolation: InterpolationSource::Controller };
 const POSITIONING: ModeSelection = ModeSelection::by_drive(OperatingMode::Position);
 const HOMING: ModeSelection = ModeSelection::by_drive(OperatingMode::Homing);
 
@@ -72,13 +53,8 @@ pub(super) struct Task {
 enum Source {
     /// Nowhere yet: it holds the position at which it was enabled.
     None,
-    /// The gateway's profile generator, in this mode.
-    Profile {
-        profile: MotionProfile,
-        mode: ModeSelection,
-        next: MonotonicTime,
-        jog_ends: Option<MonotonicTime>,
-    },
+    /// The profile generator of the gateway.
+    Generator { generator: ProfileGenerator, jog_ends: Option<MonotonicTime> },
     /// The drive itself: positioning or homing.
     Drive,
 }
@@ -91,13 +67,12 @@ pub(super) struct LocalAxis {
     task: Option<Task>,
     source: Source,
     sequence: u32,
-    /// Since when the axis is slower than its standstill speed.
-    slow_since: Option<MonotonicTime>,
+    standstill: Standstill,
 }
 
 impl LocalAxis {
     pub(super) const fn new() -> Self {
-        Self { holder: None, task: None, source: Source::None, sequence: 0, slow_since: None }
+        Self { holder: None, task: None, source: Source::None, sequence: 0, standstill: Standstill::new() }
     }
 
     pub(super) const fn is_busy(&self) -> bool {
@@ -177,8 +152,7 @@ impl LocalAxis {
             self.source = Source::None;
         }
         self.set_points(now, axis);
-        let slow = axis.stands();
-        self.slow_since = slow.then(|| self.slow_since.unwrap_or(now.0));
+        self.standstill.watch(now.0, axis);
         let mut task = self.task?;
         let result = self.progress(now, axis, &mut task);
         self.task = if result.is_some() { None } else { Some(task) };
@@ -188,57 +162,29 @@ impl LocalAxis {
     // ---- orders --------------------------------------------------------------------------------------------------
 
     fn jog(&mut self, now: Now, axis: &mut AxisChannel, jog: Jog) -> Result<(), Failure> {
-        let acceleration = checked_acceleration(axis, jog.velocity, jog.acceleration)?;
-        let mode = [POSITION, VELOCITY].into_iter().find(|mode| has(axis, *mode));
-        let mode = mode.ok_or(Failure::Mode(POSITION))?;
-        let limits = axis.limits();
-        let here = axis.feedback().position;
-        // Speed zero brakes, wherever the axis is.
-        let moves = jog.velocity != Velocity::ZERO;
-        let backward = jog.velocity < Velocity::ZERO;
-        let limit = if backward { limits.position_min } else { limits.position_max };
-        let is_beyond = |limit: &Position| if backward { here < *limit } else { here > *limit };
-        if let Some(limit) = limit.filter(|limit| moves && is_beyond(limit)) {
-            return Err(Failure::Beyond(limit));
-        }
-        // The drive may overshoot the profile slightly.
-        let end = limit.map(|limit| match backward {
-            true => limit.saturating_add(IN_POSITION).min(here),
-            false => limit.saturating_sub(IN_POSITION).max(here),
-        });
-        let speed = Velocity(jog.velocity.get().saturating_abs());
-        self.follow_profile(now, axis, mode, acceleration, |profile| match end {
-            Some(end) if mode == POSITION && moves => profile.to_position(end, speed, acceleration),
-            _ => profile.to_velocity(jog.velocity, acceleration),
-        });
-        if let Source::Profile { jog_ends, .. } = &mut self.source {
-            *jog_ends = Some(now.0 + JOG_TIME);
-        }
+        check_enabled(axis)?;
+        let acceleration = generator::acceleration(axis, jog.velocity, jog.acceleration)?;
+        let mode = generator::run_mode(axis)?;
+        let end = generator::end_of_travel(axis, jog.velocity)?;
+        let mut generator = self.generator(now, axis, mode, acceleration);
+        generator.run(jog.velocity, acceleration, end);
+        self.source = Source::Generator { generator, jog_ends: Some(now.0 + JOG_TIME) };
         Ok(())
     }
 
     fn go(&mut self, now: Now, axis: &mut AxisChannel, to: Move) -> Result<(), Failure> {
-        if to.velocity <= Velocity::ZERO {
-            return Err(Failure::NotPositive);
-        }
-        let acceleration = checked_acceleration(axis, to.velocity, to.acceleration)?;
-        let limits = axis.limits();
-        let beyond = limits.position_max.filter(|end| to.to > *end);
-        if let Some(end) = beyond.or(limits.position_min.filter(|end| to.to < *end)) {
-            return Err(Failure::Beyond(end));
-        }
+        check_enabled(axis)?;
+        generator::target(axis, to.to, to.velocity)?;
+        let acceleration = generator::acceleration(axis, to.velocity, to.acceleration)?;
         let by_drive = match to.by {
-            Some(Generator::Drive) if !has(axis, POSITIONING) => return Err(Failure::Mode(POSITIONING)),
             Some(by) => by == Generator::Drive,
-            None => has(axis, POSITIONING),
+            None => generator::has(axis, POSITIONING),
         };
+        check_mode(axis, if by_drive { POSITIONING } else { POSITION })?;
         if !by_drive {
-            if !has(axis, POSITION) {
-                return Err(Failure::Mode(POSITION));
-            }
-            self.follow_profile(now, axis, POSITION, acceleration, |profile| {
-                profile.to_position(to.to, to.velocity, acceleration)
-            });
+            let mut generator = self.generator(now, axis, POSITION, acceleration);
+            generator.profile.to_position(to.to, to.velocity, acceleration);
+            self.source = Source::Generator { generator, jog_ends: None };
             return Ok(());
         }
         let mut command = AxisCommand {
@@ -257,9 +203,7 @@ impl LocalAxis {
 
     fn home(&mut self, now: Now, axis: &mut AxisChannel) -> Result<(), Failure> {
         check_enabled(axis)?;
-        if !has(axis, HOMING) {
-            return Err(Failure::Mode(HOMING));
-        }
+        check_mode(axis, HOMING)?;
         let mut command = AxisCommand::default();
         command.select(HOMING);
         self.source = Source::Drive;
@@ -270,8 +214,8 @@ impl LocalAxis {
     /// Brings the axis to standstill, and cancels a start in progress.
     fn stop(&mut self, now: Now, axis: &mut AxisChannel) {
         match &mut self.source {
-            Source::Profile { profile, jog_ends, .. } => {
-                profile.brake();
+            Source::Generator { generator, jog_ends } => {
+                generator.profile.brake();
                 *jog_ends = None;
             }
             Source::Drive => {
@@ -285,56 +229,29 @@ impl LocalAxis {
 
     // ---- set-points ----------------------------------------------------------------------------------------------
 
-    /// Makes the profile generator the source: from its present profile if it runs in this mode, otherwise from the actual motion.
-    fn follow_profile(
-        &mut self,
+    /// The generator in this mode: the one in progress, or one from how the axis moves.
+    fn generator(
+        &self,
         now: Now,
         axis: &AxisChannel,
         mode: ModeSelection,
-        acceleration: Acceleration,
-        change: impl FnOnce(&mut MotionProfile),
-    ) {
-        let (mut profile, next) = match self.source {
-            Source::Profile { profile, mode: known, next, .. } if known == mode => (profile, next),
-            _ => {
-                let feedback = axis.feedback();
-                let first = now.0 + UPDATE_PERIOD * 2;
-                let travel =
-                    i128::from(feedback.velocity.get()) * i128::from(first.since(feedback.at).as_nanos());
-                let travel = i64::try_from(travel / 1_000_000_000).unwrap_or(0);
-                let stands = axis.stands();
-                let velocity = if stands { Velocity::ZERO } else { feedback.velocity };
-                let position =
-                    Position(feedback.position.get().saturating_add(if stands { 0 } else { travel }));
-                (MotionProfile::moving(position, velocity, acceleration), now.0)
-            }
-        };
-        change(&mut profile);
-        self.source = Source::Profile { profile, mode, next, jog_ends: None };
+        braking: Acceleration,
+    ) -> ProfileGenerator {
+        match self.source {
+            Source::Generator { generator, .. } if generator.mode == mode => generator,
+            _ => ProfileGenerator::from_axis(now.0, axis, mode, braking),
+        }
     }
 
     fn set_points(&mut self, now: Now, axis: &mut AxisChannel) {
-        let Source::Profile { mut profile, mode, mut next, jog_ends } = self.source else { return };
-        if jog_ends.is_some_and(|ends| now.0 >= ends) || mode == VELOCITY && runs_beyond(axis) {
-            profile.brake();
+        let Source::Generator { mut generator, jog_ends } = self.source else { return };
+        if jog_ends.is_some_and(|ends| now.0 >= ends) {
+            generator.profile.brake();
         }
-        if now.0.since(next) > UPDATE_PERIOD * i64::from(CATCH_UP_MAX) {
-            next = now.0;
-        }
-        while now.0 >= next {
-            profile.step(UPDATE_PERIOD);
-            let mut command = AxisCommand {
-                position: profile.position(),
-                velocity: profile.velocity(),
-                present: if mode == POSITION { CommandSet::POSITION } else { CommandSet::VELOCITY },
-                target_time: Some(next + UPDATE_PERIOD * 2),
-                ..AxisCommand::default()
-            };
-            command.select(mode);
+        while let Some(command) = generator.poll(now.0, axis) {
             self.send(now, axis, command);
-            next = next + UPDATE_PERIOD;
         }
-        self.source = Source::Profile { profile, mode, next, jog_ends };
+        self.source = Source::Generator { generator, jog_ends };
     }
 
     fn send(&mut self, (now, system): Now, axis: &mut AxisChannel, command: AxisCommand) {
@@ -375,12 +292,8 @@ impl LocalAxis {
         }
     }
 
-    fn is_standing(&self, now: MonotonicTime) -> bool {
-        self.slow_since.is_some_and(|since| now.since(since) >= REST_TIME)
-    }
-
     fn enabling(&mut self, now: Now, axis: &mut AxisChannel, task: &mut Task) -> Option<Result<(), Failure>> {
-        if is_operating(axis) {
+        if axis.operates() {
             return Some(Ok(()));
         }
         let Some(begun) = task.begun else {
@@ -413,9 +326,9 @@ impl LocalAxis {
         axis: &mut AxisChannel,
         waited: DurationNs,
     ) -> Option<Result<(), Failure>> {
-        let rests = self.is_standing(now.0);
+        let rests = self.standstill.is_reached(now.0);
         let done = match self.source {
-            Source::Profile { profile, .. } => profile.is_done() && rests,
+            Source::Generator { generator, .. } => generator.profile.is_done() && rests,
             Source::Drive => {
                 if rests && axis.feedback().report == Report::Halted {
                     // The drive follows set-points again, and holds the position at which it stopped.
@@ -425,7 +338,7 @@ impl LocalAxis {
                 }
                 false
             }
-            Source::None => rests && is_operating(axis) || !axis.may_have_torque(),
+            Source::None => rests && axis.operates() || !axis.may_have_torque(),
         };
         if done { Some(Ok(())) } else { (waited > STOP_TIME_OUT).then_some(Err(Failure::TimedOut)) }
     }
@@ -439,7 +352,7 @@ impl LocalAxis {
     ) -> Option<Result<(), Failure>> {
         let feedback = axis.feedback();
         let there = match self.source {
-            Source::Profile { profile, .. } => profile.is_done(),
+            Source::Generator { generator, .. } => generator.profile.is_done(),
             Source::Drive => {
                 feedback.selection() == POSITIONING && feedback.status.contains(StatusBits::TARGET_REACHED)
             }
@@ -450,14 +363,7 @@ impl LocalAxis {
             task.begun = Some(now.0);
             return None;
         }
-        let error = feedback.position.get().abs_diff(to.to.get());
-        let bound = axis
-            .limits()
-            .following_error
-            .map_or(0, |limit| limit.get() / IN_POSITION_DIVISOR)
-            .max(IN_POSITION.get());
-        let bound = bound.unsigned_abs();
-        if error <= bound && self.is_standing(now.0) {
+        if generator::is_in_position(axis, to.to) && self.standstill.is_reached(now.0) {
             return Some(Ok(()));
         }
         (now.0.since(begun) > SETTLE_TIME_OUT).then_some(Err(Failure::OffTarget(feedback.position)))
@@ -472,10 +378,11 @@ impl LocalAxis {
         if axis.feedback().selection() == HOMING && !homed {
             task.begun = Some(now.0);
         }
-        if homed && task.begun.is_some() && self.is_standing(now.0) {
-            if has(axis, POSITION) {
-                let hold = |profile: &mut MotionProfile| profile.brake();
-                self.follow_profile(now, axis, POSITION, Acceleration(1), hold);
+        if homed && task.begun.is_some() && self.standstill.is_reached(now.0) {
+            if generator::has(axis, POSITION) {
+                let mut generator = self.generator(now, axis, POSITION, Acceleration(1));
+                generator.profile.brake();
+                self.source = Source::Generator { generator, jog_ends: None };
             }
             return Some(Ok(()));
         }
@@ -487,57 +394,19 @@ impl LocalAxis {
 fn check_enabled(axis: &AxisChannel) -> Result<(), Failure> {
     match axis.fault() {
         Some(fault) => Err(Failure::Fault(fault.cause)),
-        None if !is_operating(axis) => Err(Failure::NotEnabled(axis.state())),
+        None if !axis.operates() => Err(Failure::NotEnabled(axis.state())),
         // It would not follow before the drive has ended its halt.
         None if axis.action() == Action::Halt => Err(Failure::Stopping),
         None => Ok(()),
     }
 }
 
-/// Checks a velocity and an acceleration against the limits of the axis; returns the acceleration to use.
-fn checked_acceleration(
-    axis: &AxisChannel,
-    velocity: Velocity,
-    acceleration: Option<Acceleration>,
-) -> Result<Acceleration, Failure> {
-    check_enabled(axis)?;
-    let limits = axis.limits();
-    let beyond = |limit: &Velocity| velocity.get().unsigned_abs() > limit.get().unsigned_abs();
-    if let Some(limit) = limits.velocity.filter(beyond) {
-        return Err(Failure::TooFast(limit));
-    }
-    let configured = limits.acceleration.or(axis.stop_settings().deceleration);
-    let acceleration = acceleration.or(configured).ok_or(Failure::NoAcceleration)?;
-    if acceleration <= Acceleration::ZERO {
-        return Err(Failure::NotPositive);
-    }
-    match limits.acceleration.filter(|limit| acceleration > *limit) {
-        Some(limit) => Err(Failure::TooSteep(limit)),
-        None => Ok(acceleration),
-    }
-}
-
-fn has(axis: &AxisChannel, mode: ModeSelection) -> bool {
-    axis.south().is_some_and(|program| program.has_mode(mode))
-}
-
-fn is_operating(axis: &AxisChannel) -> bool {
-    axis.state() == DriveState::Operating && axis.sequence_step() == SequenceStep::Running
+/// Whether the drive of the axis is set up for a mode.
+fn check_mode(axis: &AxisChannel, mode: ModeSelection) -> Result<(), Misfit> {
+    if generator::has(axis, mode) { Ok(()) } else { Err(Misfit::Mode(mode)) }
 }
 
 fn not_enabled(axis: &AxisChannel) -> Option<Result<(), Failure>> {
     let lost = axis.state() != DriveState::Operating && axis.fault().is_none();
     lost.then(|| Err(Failure::NotEnabled(axis.state())))
-}
-
-/// Whether an axis in velocity control can no longer stop ahead of its position limit.
-fn runs_beyond(axis: &AxisChannel) -> bool {
-    let (limits, feedback) = (axis.limits(), axis.feedback());
-    let Some(deceleration) = limits.acceleration.or(axis.stop_settings().deceleration) else { return false };
-    let velocity = i128::from(feedback.velocity.get());
-    let rest = velocity * velocity / (2 * i128::from(deceleration.get().max(1))) * velocity.signum();
-    let place = i128::from(feedback.position.get()) + rest;
-    let above = |end: Position| velocity > 0 && place > i128::from(end.get());
-    let below = |end: Position| velocity < 0 && place < i128::from(end.get());
-    limits.position_max.is_some_and(above) || limits.position_min.is_some_and(below)
 }

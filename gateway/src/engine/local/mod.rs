@@ -14,18 +14,15 @@
 
 mod axis;
 mod order;
-mod profile;
 
 pub use self::order::{Answer, ClientId, Failure, Generator, Jog, Move, Order, Request};
-pub use self::profile::MotionProfile;
 
 use profile_generic::inhibit::Inhibits;
-use profile_generic::interpolation::TargetUpdate;
 use profile_generic::parameter::Parameter;
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use self::axis::LocalAxis;
-use super::axis::{AxisChannel, Updates};
+use super::axis::AxisChannel;
 use super::bus::{self, Buses, Purpose};
 use super::north::{Exchange, North};
 use super::notice::Notice;
@@ -34,12 +31,6 @@ use crate::mapping::Mapping;
 
 /// How long an axis moves after a jog order. A client that hangs, or a key that is released, stops the axis.
 pub const JOG_TIME: DurationNs = DurationNs::from_millis(500);
-
-/// Time between two set-points of the profile generator.
-pub const UPDATE_PERIOD: DurationNs = DurationNs::from_millis(4);
-
-/// How they are handed to the axis.
-const UPDATES: Updates = Updates { period: UPDATE_PERIOD, may_miss: 4, first: TargetUpdate::Interpolate };
 
 /// Length of the queues of requests and of answers.
 const QUEUE_LEN: usize = 64;

@@ -9,6 +9,7 @@ use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::state::DriveState;
 
 use crate::engine::axis::Awaited;
+use crate::engine::generator::Misfit;
 use crate::engine::parameter::ParameterFailure;
 
 /// A connection to local control. Numbers are not used again while the gateway runs, and start at 1.
@@ -170,6 +171,19 @@ pub enum Failure {
     Taken,
     /// A parameter was not read or written.
     Parameter(ParameterFailure),
+}
+
+impl From<Misfit> for Failure {
+    fn from(misfit: Misfit) -> Self {
+        match misfit {
+            Misfit::Mode(mode) => Self::Mode(mode),
+            Misfit::NoAcceleration => Self::NoAcceleration,
+            Misfit::NotPositive => Self::NotPositive,
+            Misfit::TooFast(limit) => Self::TooFast(limit),
+            Misfit::TooSteep(limit) => Self::TooSteep(limit),
+            Misfit::Beyond(limit) => Self::Beyond(limit),
+        }
+    }
 }
 
 impl Failure {

@@ -195,6 +195,13 @@ pub struct NetworkCondition {
     pub timed_out: bool,
 }
 
+impl NetworkCondition {
+    /// That of a device without a self test, which has the address that it listens at and looks for no other station with it.
+    pub const fn listening(connected: bool, timed_out: bool) -> Self {
+        Self { self_test: false, address: true, duplicate: false, connected, timed_out }
+    }
+}
+
 /// The Network Status LED of a device on EtherNet/IP. Volume 9 leaves it to the network, whose Volume 2 is not among
 /// our documents: this is what makers of EtherNet/IP devices print in their manuals, all alike.
 ///

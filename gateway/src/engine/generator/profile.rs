@@ -1,4 +1,4 @@
-//! The profile generator of local control: velocity changes at a constant acceleration, and targets are reached at standstill.
+//! A motion profile: velocity changes at a constant acceleration, and targets are reached at standstill.
 
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::time::DurationNs;
@@ -68,6 +68,12 @@ impl MotionProfile {
     #[must_use]
     pub fn velocity(&self) -> Velocity {
         self.velocity
+    }
+
+    /// With what it accelerates and brakes.
+    #[must_use]
+    pub fn acceleration(&self) -> Acceleration {
+        self.acceleration
     }
 
     /// Whether it has reached its velocity or position.
