@@ -258,6 +258,9 @@ struct AssemblyArguments {
     /// Form of the output.
     #[arg(long, value_enum, default_value_t = AssemblyFormat::Text)]
     format: AssemblyFormat,
+    /// Only the device with this name.
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
 }
 
 /// Form of the output of `assembly`.
@@ -269,6 +272,14 @@ enum AssemblyFormat {
     Json,
     /// Tables for a page of documentation.
     Markdown,
+    /// Types and a function block in Structured Text (IEC 61131-3).
+    StructuredText,
+    /// Types and a function block as PLCopen XML (TC6).
+    Plcopen,
+    /// Types and an instruction as an L5X file.
+    L5x,
+    /// A module for Python, and a program that moves an axis.
+    Python,
 }
 
 /// Arguments of `attributes`.

@@ -411,6 +411,7 @@ impl Engine {
         }
         for channel in assemblies {
             channel.exchange(&mut exchange);
+            channel.parameters(mapping, (exchange.axes, exchange.ending), buses);
         }
     }
 
@@ -483,7 +484,7 @@ impl Engine {
         let mut notice = |notice| push(&mut notices.borrow_mut(), notice);
         let mut hand_on = |axes: &mut [AxisChannel], answer| {
             let notice = &mut |notice| push(&mut notices.borrow_mut(), notice);
-            let norths = Norths { devices, local: local.as_mut(), registers: registers.as_mut() };
+            let norths = Norths { devices, assemblies, local: local.as_mut(), registers: registers.as_mut() };
             hand_on((now, system), mapping, norths, axes, answer, notice);
         };
         for bus in buses.iter_mut() {
@@ -496,6 +497,7 @@ impl Engine {
 /// Who asks drives.
 struct Norths<'a> {
     devices: &'a mut [DeviceChannel],
+    assemblies: &'a mut [AssemblyChannel],
     local: Option<&'a mut LocalNorth>,
     registers: Option<&'a mut RegisterNorth>,
 }
@@ -519,6 +521,12 @@ fn hand_on(
             note_set(norths.devices, answer.axis, &answer);
             if let Some(local) = norths.local {
                 local.parameter_answered(ticket, &answer, axis);
+            }
+        }
+        Purpose::AssemblyParameter { device, ticket } => {
+            let mut channels = norths.assemblies.iter_mut();
+            if let Some(channel) = channels.find(|channel| channel.number() == device) {
+                channel.parameter_answered(ticket, &answer, axis);
             }
         }
         Purpose::RegisterParameter(ticket) => {

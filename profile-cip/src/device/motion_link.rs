@@ -177,7 +177,7 @@ pub struct CloseParameters {
 /// The object and attribute an explicit request is aimed at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ObjectPath {
-    /// Class code; 0x42 for the Motion Device Axis Object.
+    /// Class code.
     pub class: u16,
     /// Instance number; 0 is the class itself.
     pub instance: u32,
@@ -189,7 +189,7 @@ pub struct ObjectPath {
     pub connection_point: Option<u16>,
 }
 
-/// An explicit service request to the Motion Device Axis Object.
+/// An explicit service request to the Motion Device Axis Object, or to the parameters of a drive at a device with assemblies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExplicitRequest {
     /// Names this request.

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 const EXAMPLE: &str = include_str!("../../../examples/two-axes-in-process.toml");
 
-fn scratch(name: &str) -> PathBuf {
+pub fn scratch(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).expect("the scratch folder can be written");

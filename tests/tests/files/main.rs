@@ -4,6 +4,7 @@ mod broken;
 mod compliance;
 mod data_sheet;
 mod device_descriptions;
+mod engineering_files;
 mod mistakes;
 mod schema_values;
 mod schemas;

@@ -320,6 +320,34 @@ fn ethernetip_moves_an_axis_through_assemblies_beside_a_motion_device() {
 }
 
 #[test]
+fn the_python_file_for_users_moves_an_axis_or_says_why_not() {
+    const ADDRESS: &str = "127.0.0.70";
+    const MOTION: &str = "127.0.0.69";
+    const TEST: &str = "the_python_file_for_users_moves_an_axis_or_says_why_not";
+    let Some(python) = peer::python_or_skip(TEST, "ethernetip") else { return };
+    let example = with_assembly(include_str!("../../../examples/two-axes-in-process.toml"), ADDRESS);
+    let (mut running, capture) = start_box_of(&example, MOTION, "python-file");
+    let mut write = Command::new(axisbridge());
+    write.args(["assembly", "--format", "python", "--config"]).arg(capture.with_extension("toml"));
+    let module = write.output().expect("it starts");
+    let file = capture.with_extension("py");
+    std::fs::write(&file, &module.stdout).expect("the scratch folder can be written");
+    let moved = |to: &str, velocity: &str| {
+        let arguments = [ADDRESS, "--axis", "slide", "--to", to, "--velocity", velocity];
+        let output = Command::new(&python).arg(&file).args(arguments).output().expect("python starts");
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let (code, said, error) = moved("125000", "500000");
+    assert_eq!(code, Some(0), "{said}{error}");
+    let place: i64 = said.trim().strip_prefix("slide at ").expect("the position").parse().expect("a number");
+    assert!((place - 125_000).abs() <= 300, "{said}");
+    let (code, said, error) = moved("-55000", "500000");
+    assert!(code == Some(1) && error.contains("slide: beyond limit"), "{said}{error}");
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+}
+
+#[test]
 fn the_simulated_plc_moves_an_axis_through_assemblies_or_says_why_not() {
     const ADDRESS: &str = "127.0.0.68";
     const MOTION: &str = "127.0.0.67";

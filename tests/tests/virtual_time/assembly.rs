@@ -17,8 +17,10 @@ use profile_cip::wire::forward_close::ForwardClose;
 use profile_cip::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
 use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
 use profile_generic::fault::FaultCause;
+use profile_generic::parameter::Parameter;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
+use profile_sercos::wire::idn::Idn;
 
 const NANO: i64 = 1_000_000_000;
 /// Counts of the turntable in a revolution.
@@ -293,6 +295,58 @@ fn another_motor_than_the_configured_one_is_reported() {
         1,
         "{said}"
     );
+}
+
+/// Parameters of the drive are attributes of a vendor object: read by anybody, written by the owner alone.
+#[test]
+fn parameters_of_the_drive_are_attributes_of_a_vendor_object() {
+    const GET: u8 = 0x0E;
+    const SET: u8 = 0x10;
+    const GAIN: u16 = Parameter::POSITION_LOOP_GAIN.0;
+    let mut plc = Plc::new("{}");
+    let path = |instance: u8, attribute: u16| {
+        let [low, high] = attribute.to_le_bytes();
+        [0x20, 0x64, 0x24, instance, 0x31, 0, low, high]
+    };
+    let mut ask = |plc: &mut Plc, service, path: [u8; 8], data: &[u8]| {
+        plc.client.request(&mut plc.rig, service, &path, data)
+    };
+    let held = |plc: &Plc, axis: usize| plc.rig.line.slaves()[axis].store().number_of(Idn::standard(104));
+    for (attribute, value) in [(1, 1_u16), (2, 2), (3, 2)] {
+        assert_eq!(ask(&mut plc, GET, path(0, attribute), &[]), (0, value.to_le_bytes().to_vec()));
+    }
+    let (status, gain) = ask(&mut plc, GET, path(1, GAIN), &[]);
+    let gain = i64::from_le_bytes(gain.try_into().expect("a LINT"));
+    let (before, other) = (held(&plc, 0), held(&plc, 1));
+    assert!(status == 0 && gain > 0 && before > 0, "{status} {gain} {before}");
+    // Twice the gain is twice the number in the drive, and the other drive keeps its own.
+    assert_eq!(ask(&mut plc, SET, path(1, GAIN), &(2 * gain).to_le_bytes()), (0, vec![]));
+    assert_eq!((held(&plc, 0), held(&plc, 1)), (2 * before, other));
+    assert_eq!(ask(&mut plc, GET, path(1, GAIN), &[]), (0, (2 * gain).to_le_bytes().to_vec()));
+    for (service, path, data, status, what) in [
+        (GET, path(3, GAIN), &[][..], 0x05, "no such axis"),
+        (GET, path(0, 4), &[], 0x14, "no such class attribute"),
+        (GET, path(1, 0x7FFF), &[], 0x14, "no such parameter"),
+        (SET, path(0, 1), &[0; 8], 0x0E, "class attributes are read"),
+        (SET, path(1, GAIN), &[0; 7], 0x13, "too short"),
+        (SET, path(1, GAIN), &[0; 9], 0x15, "too long"),
+        (SET, path(1, GAIN), &i64::MAX.to_le_bytes(), 0x09, "beyond the drive's range"),
+        (GET, path(1, GAIN), &[0], 0x15, "a read has no data"),
+        (0x01, path(1, GAIN), &[], 0x08, "no other service"),
+    ] {
+        assert_eq!(ask(&mut plc, service, path, data).0, status, "{what}");
+    }
+    assert_eq!(held(&plc, 0), 2 * before, "refusals change nothing");
+
+    // While a controller owns the device, others read only.
+    plc.connect();
+    let client = Client::connect(&mut plc.rig, Ipv4Addr::new(10, 0, 0, 99));
+    let read = client.request(&mut plc.rig, GET, &path(1, GAIN), &[]);
+    assert_eq!(read, (0, (2 * gain).to_le_bytes().to_vec()));
+    assert_eq!(client.request(&mut plc.rig, SET, &path(1, GAIN), &gain.to_le_bytes()).0, 0x0F);
+    assert_eq!(held(&plc, 0), 2 * before);
+    assert_eq!(ask(&mut plc, SET, path(1, GAIN), &gain.to_le_bytes()).0, 0);
+    assert_eq!(held(&plc, 0), before);
 }
 
 const ALL: Control = Control::ENABLE.union(Control::START).union(Control::RESET);

@@ -71,6 +71,8 @@ enum Source {
 pub(super) struct PlcAxis {
     /// Number of the axis in the engine.
     pub number: usize,
+    /// Its instance in the device.
+    pub instance: u16,
     pub scale: Scale,
     stops: StopSettings,
     handshake: Handshake,
@@ -101,6 +103,7 @@ impl PlcAxis {
     pub fn new(config: &AssemblyAxis) -> Self {
         Self {
             number: config.axis,
+            instance: config.instance,
             scale: config.scale,
             stops: config.stops,
             handshake: Handshake::default(),

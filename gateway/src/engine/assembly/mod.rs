@@ -13,6 +13,7 @@
 
 mod axis;
 mod connections;
+mod parameters;
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
@@ -24,20 +25,25 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use self::axis::{Around, PlcAxis};
 use self::connections::{Connections, Counts};
+use self::parameters::Parameters;
 use super::axis::{AxisChannel, StopSettings};
+use super::bus::{Answer, Buses};
 use super::north::{Exchange, North};
 use super::notice::Notice;
 use super::port::NorthPort;
+use crate::mapping::Mapping;
 use crate::north::DeviceEnd;
 
 /// Explicit requests handled in one cycle.
-const REQUESTS_PER_CYCLE: usize = 4;
+const REQUESTS_PER_CYCLE: usize = parameters::REQUESTS_MAX;
 
 /// An axis of a device with assemblies.
 #[derive(Debug, Clone, Copy)]
 pub struct AssemblyAxis {
     /// Number of the axis in the engine.
     pub axis: usize,
+    /// Its instance in the device.
+    pub instance: u16,
     /// Its counts.
     pub scale: Scale,
     /// How it stops.
@@ -60,6 +66,7 @@ pub struct AssemblyChannel {
     reset: Option<Token>,
     /// A connection was lost, and no other has followed.
     lost: bool,
+    parameters: Parameters,
 }
 
 impl AssemblyChannel {
@@ -77,6 +84,7 @@ impl AssemblyChannel {
             synchronized: false,
             reset: None,
             lost: false,
+            parameters: Parameters::default(),
         }
     }
 
@@ -146,11 +154,13 @@ impl AssemblyChannel {
                     self.connections.close(close.o_to_t_id);
                     MotionReply::Closed { token: close.token }
                 }
-                // The adapter hands none on for a device without axis objects.
-                MotionRequest::Explicit(explicit) => {
-                    let status = GeneralStatus::SERVICE_NOT_SUPPORTED.0;
-                    MotionReply::Explicit(ExplicitReply::status(explicit.token, status))
-                }
+                MotionRequest::Explicit(explicit) => match self.parameters.push(explicit) {
+                    Ok(()) => continue,
+                    Err(token) => {
+                        let status = GeneralStatus::RESOURCE_UNAVAILABLE.0;
+                        MotionReply::Explicit(ExplicitReply::status(token, status))
+                    }
+                },
                 MotionRequest::PrepareReset(token) => {
                     self.reset = Some(token);
                     continue;
@@ -168,6 +178,22 @@ impl AssemblyChannel {
         while let Some(o_to_t_id) = self.connections.poll_ended() {
             let _ = self.link.reply(MotionReply::ConnectionLost { o_to_t_id, silent_us: 0 });
         }
+    }
+
+    /// Reads and writes parameters of the drives for explicit requests.
+    pub(in crate::engine) fn parameters(
+        &mut self,
+        mapping: &Mapping,
+        axes: (&[AxisChannel], bool),
+        buses: &mut Buses,
+    ) {
+        let device = (self.number, self.axes.as_slice());
+        self.parameters.exchange(device, axes, (mapping, buses), &mut self.link);
+    }
+
+    /// Takes the drive's answer to such an access.
+    pub(in crate::engine) fn parameter_answered(&mut self, ticket: u32, answer: &Answer, axis: &AxisChannel) {
+        self.parameters.answered(ticket, answer, axis);
     }
 
     /// Sends the input assembly on each connection on which it is due.

@@ -317,6 +317,7 @@ fn assembly_axis(number: usize, axis: &Axis) -> AssemblyAxis {
     let method = if deceleration.is_some() { StopMethod::Ramp } else { StopMethod::Decelerate };
     AssemblyAxis {
         axis: number,
+        instance: u16::from(axis.instance),
         scale: Scale { counts_per_unit: axis.motion_resolution },
         stops: StopSettings {
             plan: StopPlan { method, hold: false },

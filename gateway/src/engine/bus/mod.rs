@@ -52,6 +52,13 @@ pub enum Purpose {
     Setting(u8),
     /// Local control's access to a parameter, by its ticket.
     LocalParameter(u32),
+    /// An explicit request's access to a parameter at a device with assemblies, by its ticket.
+    AssemblyParameter {
+        /// Number of the device.
+        device: u8,
+        /// The ticket.
+        ticket: u32,
+    },
     /// A register's access to a parameter, by its ticket.
     RegisterParameter(u32),
     /// A diagnostic word, to find the cause of a fault or a warning.

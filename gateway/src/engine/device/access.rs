@@ -11,7 +11,7 @@ use profile_generic::time::MonotonicTime;
 use super::cyclic_values::CyclicValues;
 use super::encoder;
 use super::originals::Originals;
-use super::refusal::{parameter_refusal, refusal};
+use super::refusal::refusal;
 use super::scaling::signal_octets;
 use super::stopping_torque::{self, Comparison};
 use crate::engine::access::Access;
@@ -206,7 +206,7 @@ impl Accesses {
             },
             |what, result| {
                 let mut bytes = [0; 8];
-                let answer = match result.map_err(parameter_refusal) {
+                let answer = match result.map_err(GeneralStatus::from) {
                     Ok(_) if what.write => Ok(0),
                     Ok(value) => {
                         let reading = Reading { tables, device, place, axis };

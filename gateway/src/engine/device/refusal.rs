@@ -17,16 +17,18 @@ pub(super) fn refusal(failure: AccessFailure) -> GeneralStatus {
     }
 }
 
-/// The status with which an access to a computed value ends.
-pub(super) fn parameter_refusal(failure: ParameterFailure) -> GeneralStatus {
-    match failure {
-        ParameterFailure::Absent => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
-        ParameterFailure::ReadOnly => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
-        ParameterFailure::Value => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
-        ParameterFailure::NoValue(_)
-        | ParameterFailure::Refused
-        | ParameterFailure::Torque
-        | ParameterFailure::Unanswered => GeneralStatus::DEVICE_STATE_CONFLICT,
-        ParameterFailure::Busy => GeneralStatus::RESOURCE_UNAVAILABLE,
+/// The status with which an access to a generic parameter ends.
+impl From<ParameterFailure> for GeneralStatus {
+    fn from(failure: ParameterFailure) -> Self {
+        match failure {
+            ParameterFailure::Absent => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
+            ParameterFailure::ReadOnly => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
+            ParameterFailure::Value => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
+            ParameterFailure::NoValue(_)
+            | ParameterFailure::Refused
+            | ParameterFailure::Torque
+            | ParameterFailure::Unanswered => GeneralStatus::DEVICE_STATE_CONFLICT,
+            ParameterFailure::Busy => GeneralStatus::RESOURCE_UNAVAILABLE,
+        }
     }
 }

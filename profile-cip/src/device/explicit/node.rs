@@ -20,7 +20,7 @@ use crate::device::motion_link::{
     OpenParameters, Token,
 };
 use crate::device::objects::class::{
-    CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS,
+    CLASS_AXIS_PARAMETER, CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS,
 };
 use crate::device::objects::connection_manager::{self, Statistics};
 use crate::device::objects::ethernet_link::{CLASS_ETHERNET_LINK, Cleared, EthernetLink, GET_AND_CLEAR};
@@ -191,6 +191,9 @@ impl Node {
         }
         let answer = match (path.class, path.instance, request.service) {
             (CLASS_MOTION_DEVICE_AXIS, ..) if self.config.assembly.is_none() => {
+                return self.hand_on(origin, &request, path);
+            }
+            (CLASS_AXIS_PARAMETER, ..) if self.config.assembly.is_some() => {
                 return self.hand_on(origin, &request, path);
             }
             (CLASS_CONNECTION_MANAGER, 1, Service::FORWARD_OPEN | Service::LARGE_FORWARD_OPEN) => {

@@ -1,12 +1,19 @@
-//! `axisbridge assembly`: connection points, sizes and offsets of the devices with assemblies.
+//! `axisbridge assembly`: connection points, sizes and offsets of the devices with assemblies, and files for engineering tools.
+
+mod l5x;
+mod library;
+mod plcopen;
+mod python;
+mod structured_text;
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use profile_cip::assembly::layout::{CONFIGURATION_POINT, INPUT_ONLY_POINT, LISTEN_ONLY_POINT};
+use profile_cip::assembly::layout::{CONFIGURATION_POINT, INPUT_ONLY_POINT, LISTEN_ONLY_POINT, Layout};
 use profile_cip::assembly::{Assemblies, Placed};
 use serde::Serialize;
 
+use self::library::Library;
 use super::{AssemblyArguments, AssemblyFormat, CliError, print, usage};
 use crate::config::Config;
 
@@ -15,6 +22,11 @@ use crate::config::Config;
 struct Device<'a> {
     name: &'a str,
     address: String,
+    #[serde(skip)]
+    axes: Vec<&'a str>,
+    /// It can move to targets.
+    #[serde(skip)]
+    positions: bool,
     /// Connection point of the configuration assembly, which has no data.
     configuration_point: u16,
     output: Assembly<'a>,
@@ -52,16 +64,44 @@ struct Field<'a> {
 /// The configuration is faulty; the output cannot be written.
 pub fn run(arguments: &AssemblyArguments) -> Result<ExitCode, CliError> {
     let config = Config::load(&arguments.config)?;
-    let devices = devices(&config);
+    let mut devices = devices(&config);
     if devices.is_empty() {
         return Ok(usage("no device of the configuration has assemblies; expected [device.assembly]"));
+    }
+    if let Some(wanted) = &arguments.device {
+        let known = names(&devices);
+        devices.retain(|device| device.name == wanted);
+        if devices.is_empty() {
+            return Ok(usage(&format!("no device `{wanted}` with assemblies; expected {known}")));
+        }
     }
     let text = match arguments.format {
         AssemblyFormat::Text => text(&devices),
         AssemblyFormat::Markdown => markdown(&devices),
         AssemblyFormat::Json => serde_json::to_string_pretty(&devices)? + "\n",
+        format => {
+            let [device] = devices.as_slice() else {
+                let known = names(&devices);
+                return Ok(usage(&format!("the file is of one device; expected --device with {known}")));
+            };
+            file(&Library::of(device), format)?
+        }
     };
     print(text, ExitCode::SUCCESS)
+}
+
+/// The file for an engineering tool.
+fn file(library: &Library<'_>, format: AssemblyFormat) -> Result<String, CliError> {
+    Ok(match format {
+        AssemblyFormat::Plcopen => plcopen::file(library),
+        AssemblyFormat::L5x => l5x::file(library)?,
+        AssemblyFormat::Python => python::file(library),
+        _ => structured_text::file(library),
+    })
+}
+
+fn names(devices: &[Device<'_>]) -> String {
+    devices.iter().map(|device| device.name).collect::<Vec<_>>().join(", ")
 }
 
 fn devices(config: &Config) -> Vec<Device<'_>> {
@@ -74,6 +114,8 @@ fn devices(config: &Config) -> Vec<Device<'_>> {
         found.push(Device {
             name: &device.name,
             address: device.listen.to_string(),
+            axes: names.clone(),
+            positions: matches!(assemblies.layout(), Layout::Fields { mode: None | Some(1), .. }),
             configuration_point: CONFIGURATION_POINT,
             output: output(assemblies, &names),
             input: input(assemblies, &names),
