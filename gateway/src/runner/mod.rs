@@ -3,7 +3,7 @@
 //! ```text
 //! cycle thread:  UDP 2222, SERCOS interface, engine
 //! tokio:         TCP and UDP 44818, Modbus TCP, log of the engine's notices
-//! HTTP thread:   health, metrics, status, page
+//! HTTP thread:   health, metrics, status, traces, page
 //! ```
 
 mod can_watch;

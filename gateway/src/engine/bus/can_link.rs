@@ -258,6 +258,18 @@ mod tests {
     }
 
     #[test]
+    fn frames_that_pass_occupy_the_bus_and_one_that_waits_does_not() {
+        let mut link = CanLink::new(DurationNs::from_millis(4));
+        assert_eq!(link.detail(), BusDetail::Can { nominal: 0, data: 0 });
+        let mut notes = Notes::default();
+        link.receive(NOW, &mut Controller([CanInput::Frame(frame(0x181))].into(), 0), &mut notes);
+        notes.1.extend([frame(0x201), frame(0x202)]);
+        link.send(NOW, &mut Controller(VecDeque::new(), 1), &mut notes);
+        // 47 bits and 8 stuff bits each, of the frame that came and the one that was sent.
+        assert_eq!(link.detail(), BusDetail::Can { nominal: 2 * 55, data: 0 });
+    }
+
+    #[test]
     fn a_frame_that_waits_is_not_sent_after_the_controller_was_off_the_bus() {
         let mut link = CanLink::new(DurationNs::from_millis(4));
         let mut notes = Notes::default();

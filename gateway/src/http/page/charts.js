@@ -79,6 +79,7 @@ function drawLines(chart, { times, series, span, period, least, unit }) {
     nodes.push(shape('text', { x: at, y: CHART_HEIGHT - 6, 'text-anchor': anchor }, text));
   }
   nodes.push(shape('path', { class: 'frame', d: `M${left} ${MARGIN.top}V${bottom}H${right}` }));
+  nodes.push(shape('text', { x: left + 6, y: MARGIN.top + 10 }, unit));
   series.forEach((values, index) => {
     const parts = [];
     let pen = 'M';
