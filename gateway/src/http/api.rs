@@ -100,7 +100,8 @@ pub fn openapi() -> Value {
         "Electronic data sheet of a device, as `axisbridge eds` writes it",
         json!({ "200": good("The sheet", text("text/plain")), "400": wrong }),
     );
-    eds["get"]["parameters"] = json!([needed(parameter("device", "The device", json!({ "type": "string" })))]);
+    eds["get"]["parameters"] =
+        json!([needed(parameter("device", "The device", json!({ "type": "string" })))]);
     let missing = good("The text of the configuration is not known", text("text/plain"));
     let configuration = path(
         "The configuration, without its comments",

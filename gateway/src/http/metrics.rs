@@ -266,7 +266,12 @@ fn buses(families: &mut Families<'_>, status: &Overview) -> fmt::Result {
     let help = "Latest cycle of the bus after its instant of system time";
     families.gauges("axisbridge_bus_phase_error", Some(Unit::Seconds), help, errors)?;
     let busy = buses().filter_map(|bus| Some((bus.name.as_str(), seconds_of_unsigned(bus.busy_ns?))));
-    families.seconds("axisbridge_bus_busy", "Time for which frames have occupied a bus on CAN, at most", "bus", busy)
+    families.seconds(
+        "axisbridge_bus_busy",
+        "Time for which frames have occupied a bus on CAN, at most",
+        "bus",
+        busy,
+    )
 }
 
 fn devices(families: &mut Families<'_>, status: &Overview) -> fmt::Result {

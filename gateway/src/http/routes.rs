@@ -5,8 +5,8 @@ use std::sync::Arc;
 use axum::Router;
 use axum::extract::{RawQuery, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
-    RETRY_AFTER, X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue,
+    REFERRER_POLICY, RETRY_AFTER, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{Method, StatusCode};
 use axum::middleware::map_response;
@@ -161,7 +161,8 @@ async fn eds(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Respo
 async fn configuration(State(sources): State<Sources>) -> Response {
     match &sources.view.files().configuration {
         Some(text) => file(TOML, "axisbridge.toml", text.clone()),
-        None => (StatusCode::NOT_FOUND, typed(TEXT, "the text of the configuration is not known\n")).into_response(),
+        None => (StatusCode::NOT_FOUND, typed(TEXT, "the text of the configuration is not known\n"))
+            .into_response(),
     }
 }
 

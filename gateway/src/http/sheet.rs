@@ -151,7 +151,9 @@ fn values(config: &Config, axis: &Axis, alike: Alike, mapping: &Mapping) -> Vec<
     let drive = |places: &Places, of: Value| match (alike, &program) {
         (Alike::Sercos, _) => places.sercos.clone(),
         (Alike::Can(axis), _) => places.cia402.iter().map(|place| on_axis(place, axis)).collect(),
-        (Alike::Devicenet(_), program) => program.as_ref().map(|program| items(program, of)).unwrap_or_default(),
+        (Alike::Devicenet(_), program) => {
+            program.as_ref().map(|program| items(program, of)).unwrap_or_default()
+        }
     };
     let generic = &mapping.dictionaries.generic;
     let signals = generic.signals().iter().map(|signal| {
@@ -280,13 +282,14 @@ mod tests {
         assert_eq!((&*slide.axis, &*slide.drive, &*slide.unit), ("slide", "drive-b", "mm"));
         let limits = AxisLimits {
             position_min: Some(-5.0),
-            position_max: Some(1_000.0),
-            velocity: None,
-            acceleration: None,
+            position_max: Some(805.0),
+            velocity: Some(1_000.0),
+            acceleration: Some(10_000.0),
             torque: None,
-            following_error: Some(10.0),
+            following_error: None,
         };
         assert_eq!(slide.limits, limits);
+        assert_eq!(sercos.get(0).unwrap().limits.torque, Some(150.0));
     }
 
     #[test]

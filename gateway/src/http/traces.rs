@@ -236,7 +236,9 @@ impl Traces {
         let moments = || self.time.after(after);
         let phase = |(place, bus): (usize, &str)| PhaseTrace {
             bus: bus.to_owned(),
-            phase_error_ns: moments().map(|moment| moment.phase_errors.get(place).copied().flatten()).collect(),
+            phase_error_ns: moments()
+                .map(|moment| moment.phase_errors.get(place).copied().flatten())
+                .collect(),
         };
         TimeTraces {
             next: self.time.newest,

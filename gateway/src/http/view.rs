@@ -210,7 +210,9 @@ pub(super) mod tests {
         let config = crate::config::Config::parse(text, "two-axes-in-process.toml").unwrap();
         let sheets = Sheets::of(&config, &crate::mapping::Mapping::embedded().unwrap());
         let files = Files {
-            sheets: ["front", "back"].map(|name| (name.to_owned(), format!("$ sheet of {name}\n").into_bytes().into())).to_vec(),
+            sheets: ["front", "back"]
+                .map(|name| (name.to_owned(), format!("$ sheet of {name}\n").into_bytes().into()))
+                .to_vec(),
             configuration: Some("[box]\nname = \"cell 4\"\n".to_owned()),
         };
         Fixed { sheets, files }

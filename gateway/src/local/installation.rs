@@ -96,9 +96,9 @@ impl Installation {
             kind: BusKind::Sercos,
             bit_rate: None,
         });
-        let can = (1..).zip(&config.can).map(|(number, bus)| {
-            named_can(BusName::Can(number), BusKind::Canopen, &bus.link, bus.bit_rate)
-        });
+        let can = (1..)
+            .zip(&config.can)
+            .map(|(number, bus)| named_can(BusName::Can(number), BusKind::Canopen, &bus.link, bus.bit_rate));
         let devicenet = (1..).zip(&config.devicenet).map(|(number, network)| {
             named_can(BusName::Devicenet(number), BusKind::Devicenet, &network.link, network.bit_rate())
         });

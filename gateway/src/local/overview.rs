@@ -357,11 +357,7 @@ impl Overview {
 
 impl Lateness {
     fn of(lateness: &status::Lateness) -> Self {
-        Self {
-            bounds_ns: BOUNDS_NS.to_vec(),
-            counts: lateness.counts.to_vec(),
-            sum_ns: lateness.sum_ns,
-        }
+        Self { bounds_ns: BOUNDS_NS.to_vec(), counts: lateness.counts.to_vec(), sum_ns: lateness.sum_ns }
     }
 }
 
@@ -456,7 +452,11 @@ impl Node {
             NodeStatus::Sercos { place, presence, status } => Some(Self {
                 place: Some(place),
                 link: status.map(link),
-                conditions: status.iter().flat_map(|status| status.condition_names()).map(str::to_owned).collect(),
+                conditions: status
+                    .iter()
+                    .flat_map(|status| status.condition_names())
+                    .map(str::to_owned)
+                    .collect(),
                 status: status.map(|status| status.bits()),
                 ..known(presence_name(presence).to_owned())
             }),
@@ -491,7 +491,9 @@ fn link(status: DeviceStatus) -> String {
     match status.topology() {
         Topology::FastForward => "passes telegrams on".to_owned(),
         Topology::LoopbackForwardPrimary => format!("turns P telegrams round, {inactive} on the other port"),
-        Topology::LoopbackForwardSecondary => format!("turns S telegrams round, {inactive} on the other port"),
+        Topology::LoopbackForwardSecondary => {
+            format!("turns S telegrams round, {inactive} on the other port")
+        }
         Topology::StoreAndForward => "passes on other frames only".to_owned(),
     }
 }

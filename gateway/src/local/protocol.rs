@@ -257,7 +257,8 @@ pub(crate) fn fault_query(words: &[&str], axes: &[String]) -> Result<Option<Stri
 pub(crate) fn trace_query(words: &[&str], axes: &[String]) -> Result<(usize, u64), BadRequest> {
     let (mut place, mut after) = (None, 0);
     for text in words {
-        let unexpected = || BadRequest::Unexpected { text: (*text).to_owned(), expected: "axis=AXIS or after=N" };
+        let unexpected =
+            || BadRequest::Unexpected { text: (*text).to_owned(), expected: "axis=AXIS or after=N" };
         match text.split_once('=').ok_or_else(unexpected)? {
             ("axis", name) => place = Some(axis("traces", &mut std::iter::once(name), axes)?),
             ("after", value) => {

@@ -283,7 +283,8 @@ pub fn start(
     let _inside = runtime.enter();
     let mut servers = Vec::with_capacity(adapters.len());
     let named = config.devices.iter().zip(&adapters);
-    let sheets: Vec<_> = named.map(|(device, (adapter, _))| (device.name.clone(), adapter.eds.clone())).collect();
+    let sheets: Vec<_> =
+        named.map(|(device, (adapter, _))| (device.name.clone(), adapter.eds.clone())).collect();
     let restart = Arc::new(AtomicBool::new(false));
     let parts = adapters.into_iter().zip(ports).zip(markers);
     for (number, (device, (((adapter_config, end), port), (marker, gate)))) in
@@ -356,10 +357,7 @@ pub fn start(
     let http = config
         .http
         .map(|http| {
-            let files = Files {
-                sheets,
-                configuration: extras.configuration.and_then(without_comments),
-            };
+            let files = Files { sheets, configuration: extras.configuration.and_then(without_comments) };
             let fixed = Fixed { sheets: Sheets::of(config, engine.mapping()), files };
             serve_http(http, config, fixed, &status, &time, &histories, &limit)
         })

@@ -5,7 +5,16 @@ use profile_generic::time::DurationNs;
 /// Upper bounds of the classes, ns: from what a tuned real-time kernel keeps to what an ordinary host under load does. Calls that are
 /// later than the last one have a class of their own.
 pub const BOUNDS_NS: [u32; 11] = [
-    10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000, 10_000_000,
+    10_000,
+    20_000,
+    50_000,
+    100_000,
+    200_000,
+    500_000,
+    1_000_000,
+    2_000_000,
+    5_000_000,
+    10_000_000,
     100_000_000,
 ];
 

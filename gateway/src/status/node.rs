@@ -64,7 +64,11 @@ impl NodeStatus {
             Self::Unknown => ([kind::UNKNOWN, 0, 0, 0], 0, 0),
             Self::Sercos { place, presence, status } => {
                 let flags = flag::FIRST * u8::from(status.is_some());
-                ([kind::SERCOS, code(&PRESENCES, presence), 0, flags], place, status.map_or(0, |status| status.bits()))
+                (
+                    [kind::SERCOS, code(&PRESENCES, presence), 0, flags],
+                    place,
+                    status.map_or(0, |status| status.bits()),
+                )
             }
             Self::Can { state, nmt, emcy } => {
                 let flags = flag::FIRST * u8::from(nmt.is_some()) | flag::SECOND * u8::from(emcy.is_some());
@@ -120,7 +124,9 @@ mod tests {
             all.extend(PRESENCES.map(|presence| NodeStatus::Sercos { place: 511, presence, status }));
         }
         let register = ErrorRegister::from_bits_retain(0x91);
-        for (nmt, emcy) in [(None, None), (Some(NmtState::BOOT_UP), None), (Some(NmtState(0x7F)), Some((0x8130, register)))] {
+        for (nmt, emcy) in
+            [(None, None), (Some(NmtState::BOOT_UP), None), (Some(NmtState(0x7F)), Some((0x8130, register)))]
+        {
             all.extend(BootState::ALL.map(|state| NodeStatus::Can { state, nmt, emcy }));
         }
         for status in [None, Some(0), Some(0xFEDC)] {

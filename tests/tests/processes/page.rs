@@ -64,14 +64,16 @@ fn every_view_of_the_page_works_in_a_browser() {
 
         assert_eq!(report["complaints"], Value::Array(Vec::new()), "the console is silent");
         let own = format!("http://{address}/");
-        let foreign = |url: &&Value| !url.as_str().is_some_and(|url| url.starts_with(&own) || url.starts_with("data:"));
+        let foreign =
+            |url: &&Value| !url.as_str().is_some_and(|url| url.starts_with(&own) || url.starts_with("data:"));
         let requests = report["requests"].as_array().expect("a list");
         assert_eq!(requests.iter().find(foreign), None, "nothing from elsewhere");
         views(&report, &status, &faults);
         assert_eq!(report["bookmark"], "slide");
         let rows = report["filtered"].as_array().expect("a list");
         assert!(
-            (1..=3).contains(&rows.len()) && rows.iter().all(|row| row.as_str().is_some_and(|row| row.contains("S-0-0047"))),
+            (1..=3).contains(&rows.len())
+                && rows.iter().all(|row| row.as_str().is_some_and(|row| row.contains("S-0-0047"))),
             "{rows:?}"
         );
         keyboard(&report["keyboard"], &status);
@@ -109,7 +111,9 @@ fn views(report: &Value, status: &Value, faults: &Value) {
                 for key in ["controller", "gateway", "advice"] {
                     seen.shows(fault[key].as_str().expect("a text"));
                 }
-                seen.shows(&format!("{:#06X}", fault["drive_code"].as_u64().expect("a code")).replace("0X", "0x"));
+                seen.shows(
+                    &format!("{:#06X}", fault["drive_code"].as_u64().expect("a code")).replace("0X", "0x"),
+                );
                 seen.shows("10.000 rev/s");
             }
             "#/bus/SERCOS" => {
@@ -117,7 +121,9 @@ fn views(report: &Value, status: &Value, faults: &Value) {
                 seen.shows(status["buses"][0]["topology"].as_str().expect("a text"));
                 seen.shows(status["axes"][0]["node"]["link"].as_str().expect("a text"));
             }
-            "#/bus/CAN%20bus%201" => ["operational", "node 2", "with all stuff bits"].iter().for_each(|text| seen.shows(text)),
+            "#/bus/CAN%20bus%201" => {
+                ["operational", "node 2", "with all stuff bits"].iter().for_each(|text| seen.shows(text))
+            }
             "#/bus/DeviceNet%201" => ["MAC ID 3", "exchange"].iter().for_each(|text| seen.shows(text)),
             "#/time" => ["shared", "10 µs", "Lateness of the cycle"].iter().for_each(|text| seen.shows(text)),
             "#/mapping/slide" => ["position_command", "607A:00"].iter().for_each(|text| seen.shows(text)),
@@ -133,7 +139,8 @@ fn views(report: &Value, status: &Value, faults: &Value) {
 
 /// The actual position, as the page writes it.
 fn position(axis: &Value) -> String {
-    let (position, unit) = (axis["position"].as_f64().expect("a number"), axis["unit"].as_str().expect("a unit"));
+    let (position, unit) =
+        (axis["position"].as_f64().expect("a number"), axis["unit"].as_str().expect("a unit"));
     format!("{position:.6} {unit}")
 }
 
@@ -143,7 +150,10 @@ fn keyboard(keys: &Value, status: &Value) {
     let axes = status["axes"].as_array().expect("axes").iter();
     let wanted: Vec<String> = axes
         .map(|axis| format!("#/axis/{}", axis["name"].as_str().expect("a name")))
-        .chain(["#/", "#/time", "#/mapping/turntable", "#/downloads", "#/bus/SERCOS", "#/bus/CAN%20bus%201"].map(str::to_owned))
+        .chain(
+            ["#/", "#/time", "#/mapping/turntable", "#/downloads", "#/bus/SERCOS", "#/bus/CAN%20bus%201"]
+                .map(str::to_owned),
+        )
         .collect();
     for target in wanted {
         let at = reached.get(&target).unwrap_or_else(|| panic!("{target} is not reached: {keys}"));

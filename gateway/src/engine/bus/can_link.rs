@@ -59,7 +59,11 @@ impl Occupied {
 impl CanLink {
     /// Of a bus with this cycle.
     pub(super) const fn new(cycle_time: DurationNs) -> Self {
-        Self { queue: TransmitQueue::new(cycle_time), back: BusReturn::NEVER_LOST, occupied: Occupied { nominal: 0, data: 0 } }
+        Self {
+            queue: TransmitQueue::new(cycle_time),
+            back: BusReturn::NEVER_LOST,
+            occupied: Occupied { nominal: 0, data: 0 },
+        }
     }
 
     /// For how many bits frames have occupied the bus.
