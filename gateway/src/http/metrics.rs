@@ -224,8 +224,8 @@ fn cycles(families: &mut Families<'_>, status: &Overview) -> fmt::Result {
     let name = "axisbridge_lateness";
     let encoder = families.0.encode_descriptor(name, help, in_seconds.as_ref(), MetricType::Histogram);
     let bounds = lateness.bounds_ns.iter().map(|bound| f64::from(*bound) / NANO);
-    // The encoder sums them up, and calls the last class +Inf.
-    let classes: Vec<_> = bounds.chain([f64::MAX]).zip(lateness.counts.iter().copied()).collect();
+    // The encoder sums them up.
+    let classes: Vec<_> = bounds.chain([f64::INFINITY]).zip(lateness.counts.iter().copied()).collect();
     let sum = seconds_of_unsigned(lateness.sum_ns);
     encoder?.encode_histogram::<NoLabelSet>(sum, lateness.counts.iter().sum(), &classes, None)?;
     let help = "How the buses follow system time, the least of all: 1 for the present state";

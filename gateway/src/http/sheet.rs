@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use profile_generic::cast::f64_from_i64;
 use profile_generic::image::Signal;
+use profile_generic::mode::OperatingMode;
 use profile_generic::parameter::Parameter;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::config::{Axis, Config, DriveAt, Limits};
+use crate::config::{Axis, Config, DevicenetKind, DriveAt, Limits};
 use crate::engine::build::devicenet::parts;
 use crate::local::protocol::unit;
 use crate::mapping::{Cia402Dictionary, DriveProgram, Mapping, Object, Places};
@@ -141,19 +142,15 @@ impl AxisLimits {
 
 /// The values of an axis that are somewhere on either side.
 fn values(config: &Config, axis: &Axis, alike: Alike, mapping: &Mapping) -> Vec<MappedValue> {
-    let program = match alike {
-        Alike::Devicenet(_) => config
-            .devicenet_drive(axis)
-            .and_then(|(network, drive)| parts(network, drive, axis, mapping).ok())
-            .map(|parts| parts.program),
+    let devicenet = match alike {
+        Alike::Devicenet(_) => OnDevicenet::of(config, axis, mapping),
         Alike::Sercos | Alike::Can(_) => None,
     };
-    let drive = |places: &Places, of: Value| match (alike, &program) {
+    let drive = |places: &Places, of: Value| match (alike, &devicenet) {
         (Alike::Sercos, _) => places.sercos.clone(),
         (Alike::Can(axis), _) => places.cia402.iter().map(|place| on_axis(place, axis)).collect(),
-        (Alike::Devicenet(_), program) => {
-            program.as_ref().map(|program| items(program, of)).unwrap_or_default()
-        }
+        (Alike::Devicenet(_), Some(drive)) => drive.places(places, of),
+        (Alike::Devicenet(_), None) => Vec::new(),
     };
     let generic = &mapping.dictionaries.generic;
     let signals = generic.signals().iter().map(|signal| {
@@ -188,18 +185,44 @@ enum Value {
     Parameter(Parameter),
 }
 
-/// Where a drive has a value, by its program.
-fn items(program: &DriveProgram, of: Value) -> Vec<String> {
-    match of {
-        Value::Signal(signal) => program
-            .command_fields()
-            .chain(program.feedback_fields())
-            .filter(|(field, _)| field.signal == signal)
-            .map(|(_, item)| item.to_string())
-            .collect(),
-        Value::Parameter(parameter) => {
-            program.parameter(parameter).map(|held| held.item.to_string()).into_iter().collect()
+/// A drive on DeviceNet: what it has follows from its program, which the configuration makes.
+struct OnDevicenet {
+    program: DriveProgram,
+    /// The modes of a CIP Motion drive; none of a velocity drive.
+    modes: Option<Vec<OperatingMode>>,
+}
+
+impl OnDevicenet {
+    fn of(config: &Config, axis: &Axis, mapping: &Mapping) -> Option<Self> {
+        let (network, drive) = config.devicenet_drive(axis)?;
+        let program = parts(network, drive, axis, mapping).ok()?.program;
+        let modes = match &drive.kind {
+            DevicenetKind::Motion { modes, .. } => Some(modes.clone()),
+            DevicenetKind::Speed { .. } => None,
+        };
+        Some(Self { program, modes })
+    }
+
+    fn places(&self, places: &Places, of: Value) -> Vec<String> {
+        match of {
+            Value::Parameter(parameter) => {
+                let held = self.program.parameter(parameter);
+                held.map(|held| held.item.to_string()).into_iter().collect()
+            }
+            Value::Signal(signal) if !self.carries(signal) => Vec::new(),
+            // The elements of the updates have the same names on both networks.
+            Value::Signal(_) if self.modes.is_some() => {
+                places.cip.iter().filter(|place| place.contains(": ")).cloned().collect()
+            }
+            Value::Signal(_) => vec!["poll message".to_owned()],
         }
+    }
+
+    fn carries(&self, signal: Signal) -> bool {
+        let modes = self.modes.as_deref().unwrap_or(&[OperatingMode::Velocity]);
+        let command =
+            |mode: &OperatingMode| self.program.carries((*mode).into()).contains(signal.command_bit());
+        if signal.is_command() { modes.iter().any(command) } else { self.program.tells(signal) }
     }
 }
 
@@ -261,7 +284,10 @@ mod tests {
         assert_eq!(command.drive, ["S-0-0047"]);
         assert_eq!(row(&can, 1, "position_command").drive, ["607A:00"]);
         let other = row(&devicenet, 0, "position_command");
-        assert!(!other.drive.is_empty() && other.cip == command.cip, "{other:?}");
+        assert_eq!(
+            (&*other.drive, &other.cip),
+            (&["Command Data Set: Command Position".to_owned()][..], &command.cip)
+        );
         let torque = row(&sercos, 0, "torque_actual");
         assert_eq!((torque.field.as_deref(), &*torque.drive), (Some("torque"), &["S-0-0084".to_owned()][..]));
         assert!(sercos.get(0).unwrap().values.iter().any(|value| value.kind == "parameter"));

@@ -108,12 +108,11 @@ fn views(report: &Value, status: &Value, faults: &Value) {
                 let axis = &status["axes"][0];
                 seen.shows(axis["cip_state"].as_str().expect("a text"));
                 seen.shows(&position(axis));
-                for key in ["controller", "gateway", "advice"] {
+                for key in ["gateway", "drive_says", "advice"] {
                     seen.shows(fault[key].as_str().expect("a text"));
                 }
-                seen.shows(
-                    &format!("{:#06X}", fault["drive_code"].as_u64().expect("a code")).replace("0X", "0x"),
-                );
+                seen.shows(fault["controller"].as_str().unwrap_or("not reported"));
+                seen.shows(&format!("{:#06X}", fault["drive_code"].as_u64().expect("a code")));
                 seen.shows("10.000 rev/s");
             }
             "#/bus/SERCOS" => {

@@ -96,6 +96,12 @@ function drawAxis(unit) {
 
 const optional = (value, digits, unit) => (value === null || value === undefined ? 'none' : number(value, digits, unit));
 
+// Whether the telegram of the drive has had this value last.
+function isReported(key) {
+  const values = axisView.samples.lists ? axisView.samples.lists[key] : [];
+  return values.length === 0 || values[values.length - 1] !== null;
+}
+
 function showAxisValues(axis) {
   const { unit } = axis;
   const pairs = [
@@ -105,7 +111,7 @@ function showAxisValues(axis) {
     ['Velocity command', optional(axis.velocity_command, 6, `${unit}/s`)],
     ['Torque', number(axis.torque, 1, '%')],
     ['Torque command', optional(axis.torque_command, 1, '%')],
-    ['Following error', number(axis.following_error, 6, unit)],
+    ['Following error', isReported('following_error') ? number(axis.following_error, 6, unit) : 'not reported'],
   ];
   if (axis.current !== null) pairs.push(['Current', number(axis.current, 2, 'A')]);
   if (axis.bus_voltage !== null) pairs.push(['DC bus', number(axis.bus_voltage, 1, 'V')]);
@@ -122,7 +128,8 @@ function showLimits(axis) {
   const of = (value, digits, per) => (value === null ? 'the drive’s' : number(value, digits, per));
   const reached = axis.drive_status.filter((bit) => /limit$|limit_switch$/.test(bit));
   list(axisView.limits, [
-    ['Position', `${of(limits.position_min, 3, unit)} to ${of(limits.position_max, 3, unit)}`],
+    ['Lowest position', of(limits.position_min, 3, unit)],
+    ['Highest position', of(limits.position_max, 3, unit)],
     ['Velocity', of(limits.velocity, 3, `${unit}/s`)],
     ['Acceleration', of(limits.acceleration, 1, `${unit}/s²`)],
     ['Torque', of(limits.torque, 1, '%')],

@@ -36,8 +36,8 @@ function duration(seconds) {
 
 function span(nanoseconds) {
   const size = Math.abs(nanoseconds);
-  if (size >= 1e6) return `${nanoseconds / 1e6} ms`;
-  if (size >= 1e3) return `${nanoseconds / 1e3} µs`;
+  if (size >= 1e6) return `${Number((nanoseconds / 1e6).toFixed(3))} ms`;
+  if (size >= 1e3) return `${Number((nanoseconds / 1e3).toFixed(3))} µs`;
   return `${nanoseconds} ns`;
 }
 

@@ -26,7 +26,7 @@ function buildTime() {
     offset,
     phase,
     late,
-    table: table(late.node.parentElement, ['Late by at most', 'Calls', 'Share']),
+    table: table(late.node.parentElement, ['Late by at most', 'Calls', 'Share'], 1),
     samples: new Samples('/api/v1/time?', TEN_MINUTES),
   });
 }

@@ -128,14 +128,14 @@ function section(view, id, title, wide) {
   return view.appendChild(node);
 }
 
-// A table with these columns; returns its body.
-function table(parent, names) {
+// A table with these columns, of which those from a place on are numbers; returns its body.
+function table(parent, names, numbersFrom = names.length) {
   const node = parent.appendChild(element('table'));
   const row = node.appendChild(element('thead')).appendChild(element('tr'));
-  for (const name of names) {
-    const cell = row.appendChild(element('th', '', name));
+  names.forEach((name, column) => {
+    const cell = row.appendChild(element('th', column >= numbersFrom ? 'number' : '', name));
     cell.scope = 'col';
-  }
+  });
   return node.appendChild(element('tbody'));
 }
 
