@@ -2,7 +2,7 @@
 
     page.py CHROMIUM URL FOLDER
 
-Prints one JSON object: what each view shows, what the console and the network said, where the keyboard leads. Screenshots go to FOLDER.
+Prints one JSON object: what each view shows, what the console and the network said, what Tab and Enter reach. Screenshots go to FOLDER.
 """
 
 import base64

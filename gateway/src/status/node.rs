@@ -63,7 +63,7 @@ impl NodeStatus {
         let (head, first, second) = match self {
             Self::Unknown => ([kind::UNKNOWN, 0, 0, 0], 0, 0),
             Self::Sercos { place, presence, status } => {
-                let flags = flag::FIRST * u8::from(status.is_some());
+                let flags = flags(status.is_some(), false);
                 (
                     [kind::SERCOS, code(&PRESENCES, presence), 0, flags],
                     place,
@@ -71,13 +71,13 @@ impl NodeStatus {
                 )
             }
             Self::Can { state, nmt, emcy } => {
-                let flags = flag::FIRST * u8::from(nmt.is_some()) | flag::SECOND * u8::from(emcy.is_some());
+                let flags = flags(nmt.is_some(), emcy.is_some());
                 let (error, register) = emcy.unwrap_or((0, ErrorRegister::empty()));
                 let nmt = nmt.map_or(0, |nmt| nmt.0);
                 ([kind::CAN, code(&BootState::ALL, state), nmt, flags], error, u16::from(register.bits()))
             }
             Self::Devicenet { phase, status } => {
-                let flags = flag::FIRST * u8::from(status.is_some());
+                let flags = flags(status.is_some(), false);
                 ([kind::DEVICENET, code(&Phase::ALL, phase), 0, flags], status.unwrap_or(0), 0)
             }
         };
@@ -107,6 +107,11 @@ impl NodeStatus {
             _ => Self::Unknown,
         }
     }
+}
+
+/// Which of the two values are there.
+fn flags(first: bool, second: bool) -> u8 {
+    (if first { flag::FIRST } else { 0 }) | (if second { flag::SECOND } else { 0 })
 }
 
 fn code<T: PartialEq>(all: &[T], one: T) -> u8 {

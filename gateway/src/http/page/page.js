@@ -41,7 +41,7 @@ function span(nanoseconds) {
   return `${nanoseconds} ns`;
 }
 
-// The element of the value of a cell: a link where the cell leads somewhere.
+// The element of the value of a cell: a link where the cell has an address.
 function valueOf(cell, href) {
   let value = cell.firstElementChild;
   if (!href) return value;
