@@ -110,6 +110,16 @@ pub fn nmap_or_skip(test: &str) -> bool {
     here
 }
 
+/// The browser Chromium; without it `test` is skipped visibly (or fails in CI).
+#[must_use]
+pub fn chromium_or_skip(test: &str) -> Option<PathBuf> {
+    let found = ["chromium", "chromium-browser"].into_iter().find(|program| has_program(program));
+    if found.is_none() {
+        skip(test, "the browser Chromium");
+    }
+    found.map(PathBuf::from)
+}
+
 fn in_ci() -> bool {
     std::env::var("CI").is_ok_and(|value| value == "true" || value == "1")
 }

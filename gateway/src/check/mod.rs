@@ -17,6 +17,7 @@ pub mod schema;
 mod startup;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::config::{Config, Named, Written};
 use crate::finding::Findings;
@@ -40,6 +41,8 @@ pub struct Outcome {
     pub tables: mapping::check::Outcome,
     /// The configuration, where there is one without errors.
     pub config: Option<Config>,
+    /// Its text.
+    pub text: Option<Arc<str>>,
     /// How many facts were shown by frames.
     pub frames: usize,
 }
@@ -65,7 +68,8 @@ pub fn check(request: &Request<'_>) -> Outcome {
     let mapping::check::Outcome { mapping, findings, .. } = &mut tables;
     let shown = mapping.as_ref().filter(|_| request.frames && !findings.has_errors());
     let frames = shown.map_or(0, |mapping| frames::check(mapping, findings));
-    Outcome { tables, config: written.map(|written| written.config), frames }
+    let text = written.as_ref().and_then(|written| written.text.first());
+    Outcome { tables, config: written.map(|written| written.config), text, frames }
 }
 
 /// What the tables make of a configuration. Of tables in which something is wrong it counts only where it is so with the

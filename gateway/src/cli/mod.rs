@@ -113,6 +113,9 @@ struct DemoArguments {
     /// Write the recording of both sides to this file.
     #[arg(long, value_name = "FILE", default_value = "axisbridge-demo.pcapng")]
     capture: PathBuf,
+    /// Serve the web page while the axes move, and open it in a browser where there is a desktop.
+    #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, require_equals = true, default_missing_value = demo::PAGE)]
+    page: Option<std::net::SocketAddr>,
 }
 
 /// Arguments of `run`.

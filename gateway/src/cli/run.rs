@@ -54,6 +54,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
 /// A configuration and its tables, without errors.
 struct Good {
     config: Config,
+    /// The text of the configuration.
+    text: Option<Arc<str>>,
     mapping: Mapping,
 }
 
@@ -81,7 +83,7 @@ fn read(path: &Path) -> Result<(Good, Findings), Findings> {
     let outcome = check(&Request { config: Some(path), mappings: &[], frames: false });
     match (outcome.config, outcome.tables.mapping) {
         (Some(config), Some(mapping)) if !outcome.tables.findings.has_errors() => {
-            Ok((Good { config, mapping }, outcome.tables.findings))
+            Ok((Good { config, text: outcome.text, mapping }, outcome.tables.findings))
         }
         _ => Err(outcome.tables.findings),
     }
@@ -111,6 +113,7 @@ fn run_once(
     let extras = runner::Extras {
         capture: arguments.capture.as_deref(),
         local: arguments.local.as_deref(),
+        configuration: good.text.as_deref(),
         histories: Some(histories),
     };
     let running = runner::start(&good.config, good.mapping.clone(), extras, settings)?;

@@ -186,7 +186,7 @@ fn duration(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::local::overview::{Cycles, Time};
+    use crate::local::overview::{Cycles, Lateness, Time};
 
     fn axis(name: &str, unit: &str) -> Axis {
         Axis {
@@ -213,6 +213,14 @@ mod tests {
             inhibits: Vec::new(),
             lost_telegrams: 0,
             faults: 0,
+            address: "address 1".to_owned(),
+            node: None,
+            position_command: None,
+            velocity_command: None,
+            torque_command: None,
+            current: None,
+            bus_voltage: None,
+            temperature: None,
         }
     }
 
@@ -241,6 +249,7 @@ mod tests {
                 count: 1_234_567,
                 late: 2,
                 latest_ns: 83_400,
+                lateness: Lateness::default(),
                 phase_lock: "locked".to_owned(),
                 phase_error_ns: -12,
                 lost_updates: 3,

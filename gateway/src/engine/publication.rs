@@ -16,7 +16,9 @@ use super::device::DeviceChannel;
 use super::phase_lock::{Phase, PhaseLock};
 use crate::latest::Publisher;
 use crate::mapping::CipProgram;
-use crate::status::{AxisStatus, BoxState, BoxStatus, BusStatus, Controller, Indicators, PHASE_NONE};
+use crate::status::{
+    AxisStatus, BoxState, BoxStatus, BusStatus, Controller, ImageStatus, Indicators, PHASE_NONE,
+};
 
 /// Longest age of the published status while no state changes.
 const PUBLISH_PERIOD: DurationNs = DurationNs::from_millis(10);
@@ -110,6 +112,7 @@ impl Publication {
     pub fn count_lateness(&mut self, late: DurationNs, cycle_time: DurationNs) {
         let max = &mut self.status.lateness_max_ns;
         *max = (*max).max(u32::try_from(late.as_nanos()).unwrap_or(u32::MAX));
+        self.status.lateness.count(late);
         self.status.counters.late_cycles += u64::from(late.as_nanos() > cycle_time.as_nanos() / 2);
     }
 
@@ -148,6 +151,8 @@ impl Publication {
                     cycles: counts.cycles,
                     lost_telegrams: counts.lost,
                     refused_frames: counts.refused,
+                    phase_lock: sources.locks.get(place).map(PhaseLock::phase).unwrap_or_default(),
+                    detail: bus.detail(),
                 };
             }
         }
@@ -166,6 +171,7 @@ impl Publication {
             for (place, (number, state)) in channel.axis_states().enumerate() {
                 if let (Some(entry), Some(axis)) = (status.axes.get_mut(number), sources.axes.get(number)) {
                     of_axis(entry, axis);
+                    entry.node = sources.buses.node(number);
                     let shown = device.axis_condition(place);
                     entry.indicators = Indicators {
                         module,
@@ -215,6 +221,7 @@ fn fill_assembly(
     for (number, scale) in channel.members().zip(channel.scales()) {
         if let (Some(entry), Some(axis)) = (status.axes.get_mut(number), sources.axes.get(number)) {
             of_axis(entry, axis);
+            entry.node = sources.buses.node(number);
             entry.indicators = Indicators { module, network, ..Indicators::NONE };
             entry.controller = controller;
             entry.lost_updates = u32::try_from(counts.lost_updates).unwrap_or(u32::MAX);
@@ -270,6 +277,7 @@ fn of_axis(entry: &mut AxisStatus, axis: &AxisChannel) {
     entry.lost_telegrams = counters.lost_telegrams;
     entry.saturated = counters.saturated;
     entry.faults = counters.faults;
+    entry.image = ImageStatus::of(axis.command(), feedback);
 }
 
 /// The DINT that a position is on the controller's side: it wraps.
@@ -324,6 +332,8 @@ mod tests {
         }
         let status = &publication.status;
         assert_eq!((status.counters.late_cycles, status.lateness_max_ns), (1, 1_001_000));
+        assert_eq!(status.lateness.counts, [1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0]);
+        assert_eq!(status.lateness.sum_ns, 2_021_000);
     }
 
     #[test]

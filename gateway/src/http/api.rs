@@ -3,6 +3,8 @@
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
+use super::sheet::AxisSheet;
+use super::traces::{AxisTraces, TimeTraces};
 use super::view::{FaultList, HTTP_FAULTS_MAX, HTTP_LINES_MAX, LogLines, Look};
 use crate::config::LogLevel;
 use crate::history::LogQuery;
@@ -21,6 +23,9 @@ pub fn openapi() -> Value {
     let look = generator.subschema_for::<Look>();
     let faults = generator.subschema_for::<FaultList>();
     let lines = generator.subschema_for::<LogLines>();
+    let traces = generator.subschema_for::<AxisTraces>();
+    let times = generator.subschema_for::<TimeTraces>();
+    let sheet = generator.subschema_for::<AxisSheet>();
     let schemas = generator.take_definitions(false);
     let json = |schema: &schemars::Schema| json!({ "application/json": { "schema": schema } });
     let text = |kind: &str| json!({ kind: { "schema": { "type": "string" } } });
@@ -68,6 +73,40 @@ pub fn openapi() -> Value {
         ),
         of_axis("Only lines about this axis"),
     ]);
+    let needed = |mut parameter: Value| {
+        parameter["required"] = true.into();
+        parameter
+    };
+    let after = || {
+        let number = json!({ "type": "integer", "minimum": 0, "default": 0 });
+        parameter("after", "Only samples after this number", number)
+    };
+    let mut axis_traces = path(
+        "Command and actual values of the last minute of an axis, ten a second",
+        json!({ "200": good("Oldest first", json(&traces)), "400": wrong }),
+    );
+    axis_traces["get"]["parameters"] = json!([needed(of_axis("The axis")), after()]);
+    let mut time_traces = path(
+        "Offset of system time and phase errors of the buses in the last ten minutes, one a second",
+        json!({ "200": good("Oldest first", json(&times)), "400": wrong }),
+    );
+    time_traces["get"]["parameters"] = json!([after()]);
+    let mut axis_sheet = path(
+        "Limits of an axis, and where each of its values is on both sides",
+        json!({ "200": good("What does not change while the gateway runs", json(&sheet)), "400": wrong }),
+    );
+    axis_sheet["get"]["parameters"] = json!([needed(of_axis("The axis"))]);
+    let mut eds = path(
+        "Electronic data sheet of a device, as `axisbridge eds` writes it",
+        json!({ "200": good("The sheet", text("text/plain")), "400": wrong }),
+    );
+    eds["get"]["parameters"] =
+        json!([needed(parameter("device", "The device", json!({ "type": "string" })))]);
+    let missing = good("The text of the configuration is not known", text("text/plain"));
+    let configuration = path(
+        "The configuration, without its comments",
+        json!({ "200": good("Its keys and values", text("application/toml")), "404": missing }),
+    );
     let status = "The same object as that of `axisbridge status --json`";
     json!({
         "openapi": "3.1.0",
@@ -77,7 +116,7 @@ pub fn openapi() -> Value {
             "description": "The state of a running gateway. Every path is read-only.",
         },
         "paths": {
-            "/": file("Overview page for people", "text/html"),
+            "/": file("Page for people", "text/html"),
             "/page.css": file("Style of the page", "text/css"),
             "/page.js": file("Program of the page", "text/javascript"),
             "/events": events,
@@ -92,6 +131,11 @@ pub fn openapi() -> Value {
             "/api/v1/status": path(status, json!({ "200": good(status, json(&overview)) })),
             "/api/v1/faults": fault_list,
             "/api/v1/log": log,
+            "/api/v1/traces": axis_traces,
+            "/api/v1/time": time_traces,
+            "/api/v1/axis": axis_sheet,
+            "/api/v1/eds": eds,
+            "/api/v1/configuration": configuration,
             "/api/v1/openapi.json": path(
                 "This description",
                 json!({ "200": good("OpenAPI 3.1", json!({ "application/json": { "schema": { "type": "object" } } })) }),
@@ -116,6 +160,14 @@ mod tests {
         compare(&description, &description["components"]["schemas"]["FaultList"], &faults, "FaultList");
         let lines = serde_json::to_value(view.log(&LogQuery::default())).unwrap();
         compare(&description, &description["components"]["schemas"]["LogLines"], &lines, "LogLines");
+        view.sample();
+        for (name, answer) in [
+            ("AxisTraces", serde_json::to_value(view.axis_traces(0, 0)).unwrap()),
+            ("TimeTraces", serde_json::to_value(view.time_traces(0)).unwrap()),
+            ("AxisSheet", serde_json::to_value(view.sheet(1)).unwrap()),
+        ] {
+            compare(&description, &description["components"]["schemas"][name], &answer, name);
+        }
         let reference = &description["paths"]["/api/v1/status"]["get"]["responses"]["200"]["content"]["application/json"]
             ["schema"]["$ref"];
         assert_eq!(reference, "#/components/schemas/Overview");

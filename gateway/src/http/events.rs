@@ -4,17 +4,17 @@ use std::convert::Infallible;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
-use std::time::Duration;
 
 use axum::body::{Body, Bytes, HttpBody};
 use hyper::body::Frame;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
 use tokio::time::MissedTickBehavior;
 
+use super::traces::PERIOD;
 use super::view::{Look, View};
 
-/// Time from one event to the next.
-const INTERVAL: Duration = Duration::from_millis(500);
+/// Samples for the charts from one event to the next: events come twice a second.
+const SAMPLES_PER_EVENT: u32 = 5;
 
 /// When a browser connects again after the stream has ended, in the words of the stream.
 const RETRY: &str = "retry: 2000\n";
@@ -34,12 +34,18 @@ impl Events {
         Self { view, latest, places: Arc::new(Semaphore::new(viewers_max)) }
     }
 
-    /// Makes the events. It looks at the gateway also while nobody views it, so that a silent cycle thread is noticed in time.
+    /// Takes the samples for the charts, and makes the events. It looks at the gateway also while nobody views it, so that a silent cycle thread is noticed in time.
     pub async fn run(&self) {
-        let mut interval = tokio::time::interval(INTERVAL);
+        let mut interval = tokio::time::interval(PERIOD);
         interval.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        let mut samples = 0_u32;
         loop {
             interval.tick().await;
+            self.view.sample();
+            samples = samples.wrapping_add(1);
+            if !samples.is_multiple_of(SAMPLES_PER_EVENT) {
+                continue;
+            }
             let look = self.view.look();
             if self.latest.receiver_count() > 0 {
                 self.latest.send_replace(event("", &look));

@@ -128,6 +128,26 @@ impl Families<'_> {
         Ok(())
     }
 
+    /// A counter of seconds of each part of the gateway.
+    fn seconds<'a>(
+        &mut self,
+        name: &str,
+        help: &str,
+        label: &'a str,
+        values: impl IntoIterator<Item = (&'a str, f64)>,
+    ) -> fmt::Result {
+        let mut values = values.into_iter().peekable();
+        if values.peek().is_none() {
+            return Ok(());
+        }
+        let unit = Some(Unit::Seconds);
+        let mut encoder = self.0.encode_descriptor(name, help, unit.as_ref(), MetricType::Counter)?;
+        for (part, value) in values {
+            ConstCounter::new(value).encode(encoder.encode_family(&[(label, part)])?)?;
+        }
+        Ok(())
+    }
+
     /// One state of several: 1 for the present one, 0 for each other.
     fn states<'a>(
         &mut self,
@@ -199,6 +219,15 @@ fn cycles(families: &mut Families<'_>, status: &Overview) -> fmt::Result {
     )?;
     let help = "Largest lateness of a call of the engine since the start";
     families.gauge("axisbridge_lateness_max", unit(), help, f64::from(cycles.latest_ns) / NANO)?;
+    let lateness = &cycles.lateness;
+    let (help, in_seconds) = ("How late the calls of the engine were", unit());
+    let name = "axisbridge_lateness";
+    let encoder = families.0.encode_descriptor(name, help, in_seconds.as_ref(), MetricType::Histogram);
+    let bounds = lateness.bounds_ns.iter().map(|bound| f64::from(*bound) / NANO);
+    // The encoder sums them up.
+    let classes: Vec<_> = bounds.chain([f64::INFINITY]).zip(lateness.counts.iter().copied()).collect();
+    let sum = seconds_of_unsigned(lateness.sum_ns);
+    encoder?.encode_histogram::<NoLabelSet>(sum, lateness.counts.iter().sum(), &classes, None)?;
     let help = "How the buses follow system time, the least of all: 1 for the present state";
     let states = LockState::ALL.map(LockState::name);
     families.states("axisbridge_phase_lock", help, None, &states, [("", cycles.phase_lock.as_str())])?;
@@ -230,7 +259,19 @@ fn buses(families: &mut Families<'_>, status: &Overview) -> fmt::Result {
     let help = "Telegrams of drives that were not received in time";
     families.counters("axisbridge_bus_lost_telegrams", help, "bus", count(|bus| bus.lost_telegrams))?;
     let help = "Frames of the bus that were received and refused";
-    families.counters("axisbridge_bus_refused_frames", help, "bus", count(|bus| bus.refused_frames))
+    families.counters("axisbridge_bus_refused_frames", help, "bus", count(|bus| bus.refused_frames))?;
+    let errors = buses()
+        .filter(|bus| bus.phase_lock != LockState::Free.name())
+        .map(|bus| ([("bus", bus.name.as_str())], seconds(bus.phase_error_ns)));
+    let help = "Latest cycle of the bus after its instant of system time";
+    families.gauges("axisbridge_bus_phase_error", Some(Unit::Seconds), help, errors)?;
+    let busy = buses().filter_map(|bus| Some((bus.name.as_str(), seconds_of_unsigned(bus.busy_ns?))));
+    families.seconds(
+        "axisbridge_bus_busy",
+        "Time for which frames have occupied a bus on CAN, at most",
+        "bus",
+        busy,
+    )
 }
 
 fn devices(families: &mut Families<'_>, status: &Overview) -> fmt::Result {

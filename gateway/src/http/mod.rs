@@ -3,7 +3,8 @@
 //! ```text
 //! cycle thread --status--> View --Look--> /healthz /readyz /metrics /api/v1/status
 //!    histories ------------/   \--------> /api/v1/faults /api/v1/log
-//!                            \--twice a second--> /events --> page in a browser
+//!                           |\--twice a second--> /events --> page in a browser
+//!                            \--ten times a second--> Traces --> /api/v1/traces /api/v1/time
 //! ```
 //!
 //! The server has one thread of its own, below the priority of every other one, and takes only what the cycle thread
@@ -11,18 +12,24 @@
 
 mod api;
 mod events;
+mod files;
 mod health;
 mod limits;
 mod metrics;
 mod page;
 mod routes;
 mod server;
+mod sheet;
 #[cfg(test)]
 mod tests;
+mod traces;
 mod view;
 
 pub use api::openapi;
+pub use files::{Files, without_comments};
 pub use health::Health;
 pub use metrics::metrics;
 pub use server::{HttpServer, RunningServer};
-pub use view::{FaultList, LogLines, Look, Newest, View};
+pub use sheet::{AxisLimits, AxisSheet, MappedValue, Sheets};
+pub use traces::{AxisTraces, PhaseTrace, TimeTraces};
+pub use view::{FaultList, Fixed, LogLines, Look, Newest, View};

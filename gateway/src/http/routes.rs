@@ -5,13 +5,14 @@ use std::sync::Arc;
 use axum::Router;
 use axum::extract::{RawQuery, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
-    RETRY_AFTER, X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue,
+    REFERRER_POLICY, RETRY_AFTER, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{Method, StatusCode};
 use axum::middleware::map_response;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use serde::Serialize;
 
 use super::api::openapi;
 use super::events::Events;
@@ -19,10 +20,11 @@ use super::metrics::metrics;
 use super::page;
 use super::server::Load;
 use super::view::{HTTP_LINES_MAX, View};
-use crate::local::protocol::{BadRequest, fault_query, log_query};
+use crate::local::protocol::{BadRequest, after_query, axis_query, fault_query, log_query, trace_query};
 
 const TEXT: &str = "text/plain; charset=utf-8";
 const JSON: &str = "application/json";
+const TOML: &str = "application/toml";
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 /// In every answer: nothing from elsewhere, nothing inside other pages, nothing kept.
@@ -61,6 +63,11 @@ pub fn routes(sources: Sources) -> Router {
         .route("/api/v1/status", get(status))
         .route("/api/v1/faults", get(faults))
         .route("/api/v1/log", get(log))
+        .route("/api/v1/traces", get(traces))
+        .route("/api/v1/time", get(time))
+        .route("/api/v1/axis", get(axis))
+        .route("/api/v1/eds", get(eds))
+        .route("/api/v1/configuration", get(configuration))
         .route("/api/v1/openapi.json", get(async || typed(JSON, openapi().to_string())))
         .fallback(async || (StatusCode::NOT_FOUND, typed(TEXT, "there is nothing at this path\n")))
         .layer(map_response(with_headers))
@@ -100,24 +107,74 @@ async fn scrape(State(sources): State<Sources>) -> Response {
 }
 
 async fn status(State(sources): State<Sources>) -> Response {
-    // The object has texts, numbers and lists, and nothing that JSON does not know.
-    typed(JSON, serde_json::to_string(&sources.view.look().status).unwrap_or_default())
+    json(&sources.view.look().status)
 }
 
 async fn faults(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Response {
     match fault_query(&words(query.as_deref()), &sources.view.axes()) {
-        Ok(axis) => {
-            typed(JSON, serde_json::to_string(&sources.view.faults(axis.as_deref())).unwrap_or_default())
-        }
+        Ok(axis) => json(&sources.view.faults(axis.as_deref())),
         Err(error) => refused(&error),
     }
 }
 
 async fn log(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Response {
     match log_query(&mut words(query.as_deref()).into_iter(), &sources.view.axes(), HTTP_LINES_MAX) {
-        Ok(query) => typed(JSON, serde_json::to_string(&sources.view.log(&query)).unwrap_or_default()),
+        Ok(query) => json(&sources.view.log(&query)),
         Err(error) => refused(&error),
     }
+}
+
+async fn traces(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Response {
+    match trace_query(&words(query.as_deref()), &sources.view.axes()) {
+        Ok((place, after)) => json(&sources.view.axis_traces(place, after)),
+        Err(error) => refused(&error),
+    }
+}
+
+async fn time(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Response {
+    match after_query(&words(query.as_deref())) {
+        Ok(after) => json(&sources.view.time_traces(after)),
+        Err(error) => refused(&error),
+    }
+}
+
+async fn axis(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Response {
+    match axis_query(&words(query.as_deref()), &sources.view.axes()) {
+        Ok(place) => json(&sources.view.sheet(place)),
+        Err(error) => refused(&error),
+    }
+}
+
+async fn eds(State(sources): State<Sources>, RawQuery(query): RawQuery) -> Response {
+    let files = sources.view.files();
+    let query = query.unwrap_or_default();
+    match query.strip_prefix("device=").and_then(|device| Some((device, files.sheet(device)?))) {
+        Some((device, sheet)) => file(TEXT, &format!("{device}.eds"), sheet.to_vec()),
+        None => {
+            let known: Vec<_> = files.sheets.iter().map(|(name, _)| name.as_str()).collect();
+            let text = format!("unexpected `{query}`: expected device= and one of {}\n", known.join(", "));
+            (StatusCode::BAD_REQUEST, typed(TEXT, text)).into_response()
+        }
+    }
+}
+
+async fn configuration(State(sources): State<Sources>) -> Response {
+    match &sources.view.files().configuration {
+        Some(text) => file(TOML, "axisbridge.toml", text.clone()),
+        None => (StatusCode::NOT_FOUND, typed(TEXT, "the text of the configuration is not known\n"))
+            .into_response(),
+    }
+}
+
+/// An answer that a browser saves under a name. Names of devices need no escapes.
+fn file(kind: &'static str, name: &str, body: impl IntoResponse) -> Response {
+    let disposition = format!("attachment; filename=\"{name}\"");
+    ([(CONTENT_DISPOSITION, disposition)], typed(kind, body)).into_response()
+}
+
+/// The object has texts, numbers and lists, and nothing that JSON does not know.
+fn json(object: &impl Serialize) -> Response {
+    typed(JSON, serde_json::to_string(object).unwrap_or_default())
 }
 
 /// The parts of a query: names of axes and numbers need no escapes.

@@ -146,6 +146,74 @@ fn histories_are_answered_by_axis_level_and_number() {
 }
 
 #[test]
+fn traces_are_answered_by_axis_and_number() {
+    let mut bench = Bench::start();
+    let json = |bench: &Bench, path: &str| -> Value {
+        let answer = bench.get(path);
+        assert_eq!(answer.code, 200, "{path}: {}", answer.body);
+        serde_json::from_str(&answer.body).unwrap()
+    };
+    // The server samples by itself.
+    let end = Instant::now() + PATIENCE;
+    while json(&bench, "/api/v1/traces?axis=slide")["next"] == 0 {
+        assert!(Instant::now() < end);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let mut later = distinct();
+    later.uptime.0 += 1_500_000_000;
+    later.axes[0].position.0 = 7_500_000_000;
+    bench.publisher.publish(&later);
+    let fresh = loop {
+        let fresh = json(&bench, "/api/v1/traces?axis=turntable&after=1");
+        if fresh["next"] == 2 {
+            break fresh;
+        }
+        assert!(Instant::now() < end);
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert_eq!((&fresh["axis"], &fresh["unit"]), (&"turntable".into(), &"rev".into()));
+    assert_eq!(fresh["position"], serde_json::json!([7.5]));
+    for (key, value) in [("uptime_s", 989.154_321_012), ("position_command", -1_234.567_890_046)] {
+        assert!((fresh[key][0].as_f64().unwrap() - value).abs() < 1e-9, "{fresh}");
+    }
+    let time = json(&bench, "/api/v1/time");
+    assert_eq!(
+        (&time["next"], &time["buses"][1]["phase_error_ns"]),
+        (&2.into(), &serde_json::json!([456, 456]))
+    );
+    assert_eq!(json(&bench, "/api/v1/time?after=2")["uptime_s"], serde_json::json!([]));
+    for (path, why) in [
+        ("/api/v1/traces", "`traces` needs the name of an axis\n"),
+        ("/api/v1/traces?axis=lathe", "unknown axis `lathe`: expected turntable, slide\n"),
+        ("/api/v1/traces?axis=slide&lines=1", "unexpected `lines=1`: expected axis=AXIS or after=N\n"),
+        ("/api/v1/traces?axis=slide&after=x", "`x` is not a whole number of 64 bits\n"),
+        ("/api/v1/time?axis=slide", "unexpected `axis=slide`: expected after=N\n"),
+        ("/api/v1/axis", "`axis` needs the name of an axis\n"),
+        ("/api/v1/axis?name=slide", "unexpected `name=slide`: expected axis=AXIS\n"),
+        ("/api/v1/eds?device=side", "unexpected `device=side`: expected device= and one of front, back\n"),
+    ] {
+        let answer = bench.get(path);
+        assert_eq!((answer.code, answer.body.as_str()), (400, why), "{path}");
+    }
+}
+
+#[test]
+fn files_are_downloaded_under_their_names() {
+    let bench = Bench::start();
+    for (path, name, body) in [
+        ("/api/v1/eds?device=back", "back.eds", "$ sheet of back\n"),
+        ("/api/v1/configuration", "axisbridge.toml", "[box]\nname = \"cell 4\"\n"),
+    ] {
+        let answer = bench.get(path);
+        assert_eq!((answer.code, answer.body.as_str()), (200, body), "{path}");
+        let disposition = format!("content-disposition: attachment; filename=\"{name}\"");
+        assert!(answer.head.contains(&disposition), "{}", answer.head);
+    }
+    let sheet: Value = serde_json::from_str(&bench.get("/api/v1/axis?axis=slide").body).unwrap();
+    assert_eq!((&sheet["limits"]["position_max"], &sheet["limits"]["torque"]), (&805.0.into(), &Value::Null));
+}
+
+#[test]
 fn health_and_readiness_are_answered_with_reasons() {
     let mut bench = Bench::start();
     let answer = bench.get("/healthz");
@@ -194,10 +262,15 @@ fn every_path_of_the_description_is_answered_and_no_other() {
     let description: Value = serde_json::from_str(&answer.body).unwrap();
     assert_eq!(description, openapi());
     let paths: Vec<&String> = description["paths"].as_object().unwrap().keys().collect();
-    assert_eq!(paths.len(), 11);
+    assert_eq!(paths.len(), 16);
     for path in paths {
+        let needed = match path.as_str() {
+            "/api/v1/traces" | "/api/v1/axis" => "?axis=slide",
+            "/api/v1/eds" => "?device=back",
+            _ => "",
+        };
         // A stream has no end: its head is enough.
-        let answer = bench.ask("HEAD", path);
+        let answer = bench.ask("HEAD", &format!("{path}{needed}"));
         let good = &description["paths"][path]["get"]["responses"][answer.code.to_string()];
         let kind = good["content"].as_object().and_then(|content| content.keys().next()).expect(path);
         assert!(answer.head.contains(&format!("content-type: {kind}")), "{path}: {}", answer.head);

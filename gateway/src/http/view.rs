@@ -1,16 +1,20 @@
 //! What the server sees of the gateway: the published status, system time, and the names.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Instant, SystemTime};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::files::Files;
 use super::health::Health;
+use super::sheet::{AxisSheet, Sheets};
+use super::traces::{AxisTraces, TimeTraces, Traces};
 use crate::history::{FaultRecord, Histories, LogEvent, LogQuery, Selection};
 use crate::latest::Reader;
 use crate::local::installation::Installation;
 use crate::local::overview::Overview;
+use crate::local::protocol::unit;
 use crate::status::BoxStatus;
 use crate::status::pulse::Heartbeat;
 use crate::time::source::TimeView;
@@ -28,9 +32,21 @@ pub struct View {
     status: Reader<BoxStatus>,
     time: TimeView,
     histories: Histories,
+    fixed: Fixed,
     started: SystemTime,
+    /// What the charts show. Only the server's thread takes the lock.
+    traces: Mutex<Traces>,
     /// Of the published status. Only the server's thread takes the lock.
     heartbeat: Mutex<Heartbeat>,
+}
+
+/// What does not change while the gateway runs.
+#[derive(Debug, Clone, Default)]
+pub struct Fixed {
+    /// The axes with their limits, and where each value is.
+    pub sheets: Sheets,
+    /// What can be downloaded.
+    pub files: Files,
 }
 
 /// What was seen at one moment.
@@ -79,16 +95,53 @@ impl View {
         status: Reader<BoxStatus>,
         time: TimeView,
         histories: Histories,
+        fixed: Fixed,
         started: SystemTime,
     ) -> Self {
         let heartbeat = Mutex::new(Heartbeat::new(Instant::now()));
-        Self { installation, status, time, histories, started, heartbeat }
+        Self { installation, status, time, histories, fixed, started, traces: Mutex::default(), heartbeat }
     }
 
     /// When the gateway has started.
     #[must_use]
     pub fn started(&self) -> SystemTime {
         self.started
+    }
+
+    /// Takes a sample for the charts; to be called once in [`super::traces::PERIOD`].
+    pub fn sample(&self) {
+        let status = self.status.read();
+        self.traces().take(&status, || self.time.read());
+    }
+
+    fn traces(&self) -> MutexGuard<'_, Traces> {
+        self.traces.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Samples of an axis, by its place, after this number.
+    #[must_use]
+    pub fn axis_traces(&self, place: usize, after: u64) -> Option<AxisTraces> {
+        let axis = self.installation.axes.get(place)?;
+        Some(self.traces().of_axis(place, (&axis.name, unit(axis.kind)), after))
+    }
+
+    /// Samples of system time after this number.
+    #[must_use]
+    pub fn time_traces(&self, after: u64) -> TimeTraces {
+        let buses = self.installation.buses.iter().map(|bus| bus.name.as_str());
+        self.traces().of_time(buses, after)
+    }
+
+    /// Limits and places of the values of an axis, by its place.
+    #[must_use]
+    pub fn sheet(&self, place: usize) -> Option<AxisSheet> {
+        self.fixed.sheets.get(place)
+    }
+
+    /// What can be downloaded.
+    #[must_use]
+    pub fn files(&self) -> &Files {
+        &self.fixed.files
     }
 
     /// Looks at the gateway.
@@ -148,7 +201,21 @@ pub(super) mod tests {
         let (publisher, reader) = latest(distinct());
         let started = SystemTime::UNIX_EPOCH + Duration::from_millis(1_700_000_000_250);
         let time = TimeView::of(synchronized());
-        (View::new(installation(), reader, time, histories(), started), publisher)
+        (View::new(installation(), reader, time, histories(), fixed(), started), publisher)
+    }
+
+    /// Sheets of the axes of an example, which have the same names, and the files of two devices.
+    fn fixed() -> Fixed {
+        let text = include_str!("../../../examples/two-axes-in-process.toml");
+        let config = crate::config::Config::parse(text, "two-axes-in-process.toml").unwrap();
+        let sheets = Sheets::of(&config, &crate::mapping::Mapping::embedded().unwrap());
+        let files = Files {
+            sheets: ["front", "back"]
+                .map(|name| (name.to_owned(), format!("$ sheet of {name}\n").into_bytes().into()))
+                .to_vec(),
+            configuration: Some("[box]\nname = \"cell 4\"\n".to_owned()),
+        };
+        Fixed { sheets, files }
     }
 
     /// A fault that the drive has explained, and two lines of the log.

@@ -1,8 +1,16 @@
 //! The state of the whole gateway as one JSON object: the reply to `box`, and what `axisbridge status` shows.
 
+use profile_cia402::drive::ErrorCode;
+use profile_cia402::wire::emcy::ErrorRegister;
 use profile_cip::device::visualization;
 use profile_cip::wire::motion::codes::AxisStateCode;
+use profile_generic::can::timing::BitRate;
 use profile_generic::cast::f64_from_i64;
+use profile_generic::image::{CommandSet, FeedbackSet};
+use profile_generic::quantity::Torque;
+use profile_sercos::master::station::Presence;
+use profile_sercos::wire::device_control::Topology;
+use profile_sercos::wire::device_status::{DeviceStatus, InactivePort};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +18,10 @@ use super::advice::advice;
 use super::installation::{Installation, NamedBus, NamedDevice};
 use super::protocol::unit;
 use crate::config::TimeSource;
-use crate::status::{AxisStatus, BoxState, BoxStatus, BusStatus, Controller, PHASE_NONE};
+use crate::status::lateness::BOUNDS_NS;
+use crate::status::{
+    self, AxisStatus, BoxState, BoxStatus, BusDetail, BusStatus, Controller, NodeStatus, PHASE_NONE,
+};
 use crate::time::status::{Identity, TimeStatus};
 
 /// Version of the object. It changes when a field gets another meaning, not when one is added.
@@ -18,6 +29,12 @@ pub const FORMAT: u32 = 1;
 
 /// Nanounits in a unit.
 const NANO: f64 = 1e9;
+
+/// Microunits in a unit.
+const MICRO: f64 = 1e6;
+
+/// Thousandths in a unit.
+const MILLI: f64 = 1e3;
 
 /// Millionths of the rated torque in a percent of it.
 const PARTS_PER_PERCENT: f64 = 10_000.0;
@@ -65,6 +82,9 @@ pub struct Cycles {
     pub late: u64,
     /// Largest lateness of a call.
     pub latest_ns: u32,
+    /// How late the calls were.
+    #[serde(default)]
+    pub lateness: Lateness,
     /// `free`, `pulling` or `locked`: how the buses follow system time, the least of all.
     pub phase_lock: String,
     /// Latest cycle after its instant of system time, the largest of all.
@@ -77,6 +97,17 @@ pub struct Cycles {
     pub refused_frames: u64,
     /// Frames and datagrams that could not be sent.
     pub send_failures: u64,
+}
+
+/// How late the calls of the cycle were, since the start: a histogram.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Lateness {
+    /// Upper bounds of the classes.
+    pub bounds_ns: Vec<u32>,
+    /// Calls in each class, and last those that were later than the last bound.
+    pub counts: Vec<u64>,
+    /// Lateness of all calls together.
+    pub sum_ns: u64,
 }
 
 /// System time.
@@ -140,6 +171,55 @@ pub struct Bus {
     pub lost_telegrams: u64,
     /// Frames that were received and refused.
     pub refused_frames: u64,
+    /// `sercos`, `canopen` or `devicenet`; empty if the gateway is older than this field.
+    #[serde(default)]
+    pub kind: String,
+    /// `free`, `pulling` or `locked`: how its cycles follow system time.
+    #[serde(default)]
+    pub phase_lock: String,
+    /// Last cycle after its instant of system time.
+    #[serde(default)]
+    pub phase_error_ns: i64,
+    /// What the network is, from the ports of the SERCOS master, such as `ring`.
+    #[serde(default)]
+    pub topology: Option<String>,
+    /// Telegrams that the ports of the SERCOS master have lost: port 1, port 2.
+    #[serde(default)]
+    pub ports: Vec<PortCounters>,
+    /// Nominal bit rate of a bus on CAN.
+    #[serde(default)]
+    pub bit_rate: Option<u32>,
+    /// How long frames have occupied a bus on CAN, with all stuff bits that they can have: its change over time is the load.
+    #[serde(default)]
+    pub busy_ns: Option<u64>,
+}
+
+/// Telegrams that did not come back on a port of the SERCOS master, although the topology gives them back there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct PortCounters {
+    /// MDTs.
+    pub lost_mdt: u32,
+    /// ATs.
+    pub lost_at: u32,
+}
+
+/// The node of an axis, as the master of its bus knows it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Node {
+    /// How far its master has brought it, or whether it takes part, such as `active` or `operational`.
+    pub state: String,
+    /// SERCOS: its place in the network, from 1.
+    pub place: Option<u16>,
+    /// SERCOS: how it passes telegrams on, and what it sees on its inactive port.
+    pub link: Option<String>,
+    /// CANopen: state of its network management, as it has reported it.
+    pub nmt: Option<String>,
+    /// CANopen: its last EMCY.
+    pub emcy: Option<String>,
+    /// SERCOS: errors and warnings of its device status.
+    pub conditions: Vec<String>,
+    /// SERCOS: device status (S-DEV). DeviceNet: status of its Identity object.
+    pub status: Option<u16>,
 }
 
 /// An axis.
@@ -199,6 +279,30 @@ pub struct Axis {
     /// Faults that have occurred.
     #[serde(default)]
     pub faults: u32,
+    /// Its drive on the bus, such as `address 3`, `node 5` or `MAC ID 7`.
+    #[serde(default)]
+    pub address: String,
+    /// The node of its drive, as far as it is known.
+    #[serde(default)]
+    pub node: Option<Node>,
+    /// Position set-point as the drive has got it last, in the unit.
+    #[serde(default)]
+    pub position_command: Option<f64>,
+    /// Velocity set-point as the drive has got it last, in the unit per second.
+    #[serde(default)]
+    pub velocity_command: Option<f64>,
+    /// Torque set-point as the drive has got it last, percent of the rated torque.
+    #[serde(default)]
+    pub torque_command: Option<f64>,
+    /// Motor current in ampere, where the telegram of the drive has it.
+    #[serde(default)]
+    pub current: Option<f64>,
+    /// Voltage of the DC bus in volt, where the telegram of the drive has it.
+    #[serde(default)]
+    pub bus_voltage: Option<f64>,
+    /// Temperature of the motor in degrees Celsius, where the telegram of the drive has it.
+    #[serde(default)]
+    pub temperature: Option<f64>,
 }
 
 impl Overview {
@@ -222,6 +326,7 @@ impl Overview {
                 count: counters.cycles,
                 late: counters.late_cycles,
                 latest_ns: status.lateness_max_ns,
+                lateness: Lateness::of(&status.lateness),
                 phase_lock: status.phase_lock.state.name().to_owned(),
                 phase_error_ns: status.phase_lock.error.0,
                 lost_updates: counters.lost_updates,
@@ -247,6 +352,12 @@ impl Overview {
     pub fn is_healthy(&self) -> bool {
         let timed = self.time.synchronized || self.time.source == TimeSource::None.name();
         self.is_up() && timed && self.axes.iter().all(|axis| axis.fault.is_none())
+    }
+}
+
+impl Lateness {
+    fn of(lateness: &status::Lateness) -> Self {
+        Self { bounds_ns: BOUNDS_NS.to_vec(), counts: lateness.counts.to_vec(), sum_ns: lateness.sum_ns }
     }
 }
 
@@ -296,14 +407,112 @@ impl Bus {
             cycles: status.cycles,
             lost_telegrams: status.lost_telegrams,
             refused_frames: status.refused_frames,
+            kind: bus.kind.name().to_owned(),
+            phase_lock: status.phase_lock.state.name().to_owned(),
+            phase_error_ns: status.phase_lock.error.0,
+            topology: match status.detail {
+                BusDetail::Sercos { topology, .. } => Some(topology.to_string()),
+                BusDetail::Can { .. } | BusDetail::None => None,
+            },
+            ports: match status.detail {
+                BusDetail::Sercos { lost, .. } => {
+                    lost.map(|port| PortCounters { lost_mdt: port.mdt, lost_at: port.at }).to_vec()
+                }
+                BusDetail::Can { .. } | BusDetail::None => Vec::new(),
+            },
+            bit_rate: bus.bit_rate.map(BitRate::nominal),
+            busy_ns: match (status.detail, bus.bit_rate) {
+                (BusDetail::Can { nominal, data }, Some(rate)) => Some(busy_ns(rate, nominal, data)),
+                _ => None,
+            },
         }
     }
+}
+
+/// How long so many bits take.
+fn busy_ns(rate: BitRate, nominal: u64, data: u64) -> u64 {
+    let span = |bits: u64, rate: u32| u128::from(bits) * 1_000_000_000 / u128::from(rate.max(1));
+    let sum = span(nominal, rate.nominal()) + span(data, rate.data().unwrap_or(rate.nominal()));
+    u64::try_from(sum).unwrap_or(u64::MAX)
+}
+
+impl Node {
+    fn of(node: NodeStatus) -> Option<Self> {
+        let known = |state: String| Self {
+            state,
+            place: None,
+            link: None,
+            nmt: None,
+            emcy: None,
+            conditions: Vec::new(),
+            status: None,
+        };
+        match node {
+            NodeStatus::Unknown => None,
+            NodeStatus::Sercos { place, presence, status } => Some(Self {
+                place: Some(place),
+                link: status.map(link),
+                conditions: status
+                    .iter()
+                    .flat_map(|status| status.condition_names())
+                    .map(str::to_owned)
+                    .collect(),
+                status: status.map(|status| status.bits()),
+                ..known(presence_name(presence).to_owned())
+            }),
+            NodeStatus::Can { state, nmt, emcy } => Some(Self {
+                nmt: nmt.map(|nmt| nmt.to_string()),
+                emcy: emcy.map(|(code, register)| emergency(ErrorCode(code), register)),
+                ..known(state.to_string())
+            }),
+            NodeStatus::Devicenet { phase, status } => Some(Self { status, ..known(phase.to_string()) }),
+        }
+    }
+}
+
+const fn presence_name(presence: Presence) -> &'static str {
+    match presence {
+        Presence::Active => "active",
+        Presence::Lost => "lost",
+        Presence::Excluded => "excluded",
+        Presence::Absent => "absent",
+        Presence::Joining => "joining",
+    }
+}
+
+/// How a slave passes telegrams on, and what it sees on the port that it does not pass them to.
+fn link(status: DeviceStatus) -> String {
+    let inactive = match status.inactive_port() {
+        InactivePort::NoLink => "no link",
+        InactivePort::Link => "a link without telegrams",
+        InactivePort::PrimaryTelegram => "P telegrams",
+        InactivePort::SecondaryTelegram => "S telegrams",
+    };
+    match status.topology() {
+        Topology::FastForward => "passes telegrams on".to_owned(),
+        Topology::LoopbackForwardPrimary => format!("turns P telegrams round, {inactive} on the other port"),
+        Topology::LoopbackForwardSecondary => {
+            format!("turns S telegrams round, {inactive} on the other port")
+        }
+        Topology::StoreAndForward => "passes on other frames only".to_owned(),
+    }
+}
+
+fn emergency(code: ErrorCode, register: ErrorRegister) -> String {
+    let name = code.name().map(|name| format!(" ({name})")).unwrap_or_default();
+    format!("{:04X}{name}, error register {register}", code.0)
 }
 
 impl Axis {
     fn of(known: &Installation, number: usize, axis: &AxisStatus) -> Self {
         let units = |nano: i64| f64_from_i64(nano) / NANO;
         let named = &known.axes[number];
+        let image = &axis.image;
+        let command = |set: CommandSet, value: f64| image.commands.contains(set).then_some(value);
+        let actual = |set: FeedbackSet, value: i64, scale: f64| {
+            image.actual.contains(set).then(|| f64_from_i64(value) / scale)
+        };
+        let percent = |torque: Torque| f64_from_i64(torque.get()) / PARTS_PER_PERCENT;
         let device = known.devices.get(usize::from(axis.device)).filter(|_| axis.instance != 0);
         Self {
             name: named.name.clone(),
@@ -320,7 +529,7 @@ impl Axis {
             unit: unit(named.kind).to_owned(),
             position: units(axis.position.get()),
             velocity: units(axis.velocity.get()),
-            torque: f64_from_i64(axis.torque.get()) / PARTS_PER_PERCENT,
+            torque: percent(axis.torque),
             following_error: units(axis.following_error.get()),
             fault: axis.fault.map(|fault| fault.to_string()),
             advice: axis.fault.map(|fault| advice(fault).to_owned()),
@@ -329,6 +538,14 @@ impl Axis {
             inhibits: lower_case(axis.inhibits.iter_names().map(|(name, _)| name)),
             lost_telegrams: axis.lost_telegrams,
             faults: axis.faults,
+            address: named.address.clone(),
+            node: Node::of(axis.node),
+            position_command: command(CommandSet::POSITION, units(image.position_command.get())),
+            velocity_command: command(CommandSet::VELOCITY, units(image.velocity_command.get())),
+            torque_command: command(CommandSet::TORQUE, percent(image.torque_command)),
+            current: actual(FeedbackSet::CURRENT, image.current.get(), MICRO),
+            bus_voltage: actual(FeedbackSet::BUS_VOLTAGE, image.bus_voltage.get(), MICRO),
+            temperature: actual(FeedbackSet::TEMPERATURE, image.temperature.get(), MILLI),
         }
     }
 }

@@ -253,6 +253,42 @@ pub(crate) fn fault_query(words: &[&str], axes: &[String]) -> Result<Option<Stri
     Ok(wanted)
 }
 
+/// The place of the axis that is wanted, and the number after which its samples are.
+pub(crate) fn trace_query(words: &[&str], axes: &[String]) -> Result<(usize, u64), BadRequest> {
+    let (mut place, mut after) = (None, 0);
+    for text in words {
+        let unexpected =
+            || BadRequest::Unexpected { text: (*text).to_owned(), expected: "axis=AXIS or after=N" };
+        match text.split_once('=').ok_or_else(unexpected)? {
+            ("axis", name) => place = Some(axis("traces", &mut std::iter::once(name), axes)?),
+            ("after", value) => {
+                after = value.parse().map_err(|_| BadRequest::Whole(value.to_owned()))?;
+            }
+            _ => return Err(unexpected()),
+        }
+    }
+    Ok((place.ok_or(BadRequest::NoAxis("traces"))?, after))
+}
+
+/// The place of the one axis that is wanted.
+pub(crate) fn axis_query(words: &[&str], axes: &[String]) -> Result<usize, BadRequest> {
+    let [text] = words else { return Err(BadRequest::NoAxis("axis")) };
+    let unexpected = || BadRequest::Unexpected { text: (*text).to_owned(), expected: "axis=AXIS" };
+    let name = text.strip_prefix("axis=").ok_or_else(unexpected)?;
+    axis("axis", &mut std::iter::once(name), axes)
+}
+
+/// The number after which samples are wanted.
+pub(crate) fn after_query(words: &[&str]) -> Result<u64, BadRequest> {
+    let mut after = 0;
+    for text in words {
+        let unexpected = || BadRequest::Unexpected { text: (*text).to_owned(), expected: "after=N" };
+        let value = text.strip_prefix("after=").ok_or_else(unexpected)?;
+        after = value.parse().map_err(|_| BadRequest::Whole(value.to_owned()))?;
+    }
+    Ok(after)
+}
+
 /// Which lines of the log are wanted, at most so many.
 pub(crate) fn log_query<'a>(
     words: &mut impl Iterator<Item = &'a str>,

@@ -553,7 +553,13 @@ mod tests {
     type Direct = (rtrb::Consumer<DirectRequest>, rtrb::Producer<DirectAnswer>);
 
     fn named((name, kind): (&str, AxisKind)) -> NamedAxis {
-        NamedAxis { name: name.to_owned(), kind, bus: 0, drive: format!("drive-{name}") }
+        NamedAxis {
+            name: name.to_owned(),
+            kind,
+            bus: 0,
+            drive: format!("drive-{name}"),
+            address: "address 1".to_owned(),
+        }
     }
 
     fn shared() -> Shared {

@@ -3,7 +3,7 @@
 //! ```text
 //! cycle thread:  UDP 2222, SERCOS interface, engine
 //! tokio:         TCP and UDP 44818, Modbus TCP, log of the engine's notices
-//! HTTP thread:   health, metrics, status, page
+//! HTTP thread:   health, metrics, status, traces, page
 //! ```
 
 mod can_watch;
@@ -48,7 +48,7 @@ use crate::engine::port::CanPort;
 use crate::engine::registers::RegisterNorth;
 use crate::history::Histories;
 use crate::host::HostPort;
-use crate::http::{HttpServer, RunningServer, View};
+use crate::http::{Files, Fixed, HttpServer, RunningServer, Sheets, View, without_comments};
 use crate::latest::Reader;
 use crate::line_limit::LineLimit;
 use crate::local::installation::Installation;
@@ -202,6 +202,8 @@ pub struct Extras<'a> {
     pub capture: Option<&'a Path>,
     /// Offers local control on this Unix socket.
     pub local: Option<&'a Path>,
+    /// The text of the configuration, for the page; without it none can be downloaded.
+    pub configuration: Option<&'a str>,
     /// What has happened so far; without it the histories begin here, and the log is not among them.
     pub histories: Option<&'a Histories>,
 }
@@ -280,6 +282,9 @@ pub fn start(
         .map_err(|source| StartError::Thread { what: "the runtime of the servers", source })?;
     let _inside = runtime.enter();
     let mut servers = Vec::with_capacity(adapters.len());
+    let named = config.devices.iter().zip(&adapters);
+    let sheets: Vec<_> =
+        named.map(|(device, (adapter, _))| (device.name.clone(), adapter.eds.clone())).collect();
     let restart = Arc::new(AtomicBool::new(false));
     let parts = adapters.into_iter().zip(ports).zip(markers);
     for (number, (device, (((adapter_config, end), port), (marker, gate)))) in
@@ -349,8 +354,14 @@ pub fn start(
             }
         });
     }
-    let http =
-        config.http.map(|http| serve_http(http, config, &status, &time, &histories, &limit)).transpose()?;
+    let http = config
+        .http
+        .map(|http| {
+            let files = Files { sheets, configuration: extras.configuration.and_then(without_comments) };
+            let fixed = Fixed { sheets: Sheets::of(config, engine.mapping()), files };
+            serve_http(http, config, fixed, &status, &time, &histories, &limit)
+        })
+        .transpose()?;
     let socket = extras
         .local
         .map(|path| {
@@ -402,6 +413,7 @@ pub fn start(
 fn serve_http(
     http: Http,
     config: &Config,
+    fixed: Fixed,
     status: &Reader<BoxStatus>,
     time: &TimeService,
     histories: &Histories,
@@ -412,7 +424,7 @@ fn serve_http(
     let server = server.limit_lines(Arc::clone(limit));
     let address = server.local_address().map_err(failed)?;
     let (names, histories) = (Installation::of(config), histories.clone());
-    let view = View::new(names, status.clone(), time.view(), histories, WallClock::now());
+    let view = View::new(names, status.clone(), time.view(), histories, fixed, WallClock::now());
     let running =
         server.start(view).map_err(|source| StartError::Thread { what: "the HTTP server", source })?;
     info!(%address, "HTTP");

@@ -1,6 +1,9 @@
 //! The state of the box as its servers show it: one fixed-size value, published by the cycle thread.
 
 mod bus;
+mod image;
+pub mod lateness;
+mod node;
 pub mod pulse;
 mod wait;
 
@@ -18,10 +21,15 @@ use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 
-pub use self::bus::{BUSES_MAX, BusStatus};
+pub use self::bus::{BUSES_MAX, BusDetail, BusStatus, PortLosses};
+pub use self::image::ImageStatus;
+pub use self::lateness::Lateness;
+pub use self::node::NodeStatus;
 pub use self::wait::AxisWait;
 
 use self::bus::BUS_WORDS;
+use self::image::IMAGE_WORDS;
+use self::lateness::LATENESS_WORDS;
 use self::wait::WAIT_WORDS;
 use crate::config::AXES_MAX;
 use crate::engine::axis::Owner;
@@ -32,10 +40,10 @@ use crate::latest::Words;
 const OWNERS: [Owner; 3] = [Owner::Nobody, Owner::Controller, Owner::Local];
 
 /// Words of one axis in the published form.
-const AXIS_WORDS: usize = 12 + WAIT_WORDS;
+const AXIS_WORDS: usize = 13 + WAIT_WORDS + IMAGE_WORDS;
 
 /// Words of the box itself.
-const BOX_WORDS: usize = 10;
+const BOX_WORDS: usize = 10 + LATENESS_WORDS;
 
 const WORDS: usize = BOX_WORDS + BUSES_MAX * BUS_WORDS + AXES_MAX * AXIS_WORDS;
 
@@ -126,6 +134,10 @@ pub struct AxisStatus {
     pub indicators: Indicators,
     /// The controller that is connected to its device.
     pub controller: Option<Controller>,
+    /// What the master of its bus knows of its node.
+    pub node: NodeStatus,
+    /// Set-points and further actual values.
+    pub image: ImageStatus,
 }
 
 /// A controller with an open CIP Motion connection.
@@ -234,6 +246,8 @@ impl AxisStatus {
         faults: 0,
         indicators: Indicators::NONE,
         controller: None,
+        node: NodeStatus::Unknown,
+        image: ImageStatus::NONE,
     };
 }
 
@@ -254,6 +268,8 @@ pub struct BoxStatus {
     pub cycle_time_ns: u32,
     /// Largest lateness of a call of the engine since the start, ns.
     pub lateness_max_ns: u32,
+    /// How late the calls of the engine were.
+    pub lateness: Lateness,
     /// Time since the first cycle.
     pub uptime: DurationNs,
     /// How the buses follow system time: the least state of all, and the largest phase error.
@@ -276,6 +292,7 @@ impl BoxStatus {
         axis_count: 0,
         cycle_time_ns: 0,
         lateness_max_ns: 0,
+        lateness: Lateness::NONE,
         uptime: DurationNs(0),
         phase_lock: Phase { state: LockState::Free, error: DurationNs(0) },
         counters: Counters {
@@ -357,8 +374,7 @@ impl AxisStatus {
             cause_high,
             cause_low,
         ];
-        let [wait_0, wait_1, wait_2] = AxisWait::to_words(self.wait);
-        [
+        let front = [
             u64::from_be_bytes(head),
             pair(self.status.bits(), self.inhibits.bits()),
             pair(self.fault_vendor_code, self.position_counts.cast_unsigned()),
@@ -371,10 +387,15 @@ impl AxisStatus {
             pair(self.saturated, self.faults),
             self.indicators.to_word(),
             Controller::to_word(self.controller),
-            wait_0,
-            wait_1,
-            wait_2,
-        ]
+            self.node.to_word(),
+        ];
+        let mut words = [0; AXIS_WORDS];
+        let (own, rest) = words.split_at_mut(front.len());
+        let (wait, image) = rest.split_at_mut(WAIT_WORDS);
+        own.copy_from_slice(&front);
+        wait.copy_from_slice(&AxisWait::to_words(self.wait));
+        image.copy_from_slice(&self.image.to_words());
+        words
     }
 
     fn from_words(words: &[u64; AXIS_WORDS]) -> Self {
@@ -391,7 +412,11 @@ impl AxisStatus {
             other,
             indicators,
             controller,
-            wait @ ..,
+            node,
+            wait_0,
+            wait_1,
+            wait_2,
+            image @ ..,
         ] = *words;
         let [instance, device, state, cip_axis_state, mode, flags, cause_high, cause_low] =
             head.to_be_bytes();
@@ -410,7 +435,7 @@ impl AxisStatus {
             mode: mode.unwrap_or_default(),
             status: StatusBits::from_bits_retain(status),
             inhibits: Inhibits::from_bits_retain(inhibits),
-            wait: AxisWait::from_words(&wait),
+            wait: AxisWait::from_words(&[wait_0, wait_1, wait_2]),
             fault: (flags & 1 != 0).then(|| FaultCause(u16::from_be_bytes([cause_high, cause_low]))),
             fault_vendor_code,
             position: Position(position.cast_signed()),
@@ -425,6 +450,8 @@ impl AxisStatus {
             faults,
             indicators: Indicators::from_word(indicators),
             controller: Controller::from_word(controller),
+            node: NodeStatus::from_word(node),
+            image: ImageStatus::from_words(&image),
         }
     }
 }
@@ -458,7 +485,9 @@ impl Words for BoxStatus {
             self.phase_lock.error.0.cast_unsigned(),
         ];
         let (front, rest) = words.split_at_mut(BOX_WORDS);
-        front.copy_from_slice(&of_box);
+        let (own, lateness) = front.split_at_mut(of_box.len());
+        own.copy_from_slice(&of_box);
+        lateness.copy_from_slice(&self.lateness.to_words());
         let buses = self.configured_buses();
         let (middle, rest) = rest.split_at_mut(buses.len() * BUS_WORDS);
         for (place, bus) in middle.as_chunks_mut::<BUS_WORDS>().0.iter_mut().zip(buses) {
@@ -473,6 +502,7 @@ impl Words for BoxStatus {
 
     fn from_words(words: &Self::Array) -> Self {
         let (front, rest) = words.split_at(BOX_WORDS);
+        let lateness = front.last_chunk().map_or(Lateness::NONE, Lateness::from_words);
         let [state, phase, connections, axis_count, lock, bus_count, ..] = front[0].to_be_bytes();
         let (cycle_time_ns, lateness_max_ns) = split(front[1]);
         let mut buses = [BusStatus::NONE; BUSES_MAX];
@@ -493,6 +523,7 @@ impl Words for BoxStatus {
             axis_count,
             cycle_time_ns,
             lateness_max_ns,
+            lateness,
             uptime: DurationNs(front[2].cast_signed()),
             phase_lock: Phase {
                 state: LockState::ALL.get(usize::from(lock)).copied().unwrap_or_default(),
@@ -514,7 +545,15 @@ impl Words for BoxStatus {
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use profile_cia402::master::boot::BootState;
+    use profile_cia402::wire::emcy::ErrorRegister;
+    use profile_cia402::wire::nmt::NmtState;
+    use profile_generic::image::{CommandSet, FeedbackSet};
     use profile_generic::program::BitPattern;
+    use profile_generic::quantity::{Current, Temperature, Voltage};
+    use profile_sercos::master::station::Presence;
+    use profile_sercos::master::topology::Topology;
+    use profile_sercos::wire::device_status::DeviceStatus;
 
     use super::*;
     use crate::engine::axis::{Awaited, Waiting};
@@ -531,6 +570,10 @@ pub(crate) mod tests {
             axis_count: 2,
             cycle_time_ns: 2_000_000,
             lateness_max_ns: 123_456,
+            lateness: Lateness {
+                counts: [101, 102, 103, 104, 105, 106, 107, 108, 109, 110, 111, 112],
+                sum_ns: 987_654_321,
+            },
             uptime: DurationNs(987_654_321_012),
             phase_lock: Phase { state: LockState::Locked, error: DurationNs(-789) },
             counters: Counters {
@@ -550,6 +593,11 @@ pub(crate) mod tests {
             cycles: 0x0102_0304_0506_0000,
             lost_telegrams: 21,
             refused_frames: 22,
+            phase_lock: Phase { state: LockState::Locked, error: DurationNs(-789) },
+            detail: BusDetail::Sercos {
+                topology: Topology::BrokenRing,
+                lost: [PortLosses { mdt: 25, at: 26 }, PortLosses { mdt: 27, at: 28 }],
+            },
         };
         status.buses[1] = BusStatus {
             up: false,
@@ -558,6 +606,8 @@ pub(crate) mod tests {
             cycles: 0x0708,
             lost_telegrams: 23,
             refused_frames: 24,
+            phase_lock: Phase { state: LockState::Pulling, error: DurationNs(456) },
+            detail: BusDetail::Can { nominal: 1_234_567, data: 89 },
         };
         status.axes[0] = AxisStatus {
             instance: 1,
@@ -590,6 +640,27 @@ pub(crate) mod tests {
                 minor_fault: true,
             },
             controller: Some(Controller { address: Ipv4Addr::new(192, 0, 2, 77), update_period_us: 8_000 }),
+            node: NodeStatus::Sercos {
+                place: 3,
+                presence: Presence::Active,
+                status: Some(DeviceStatus::SLAVE_VALID | DeviceStatus::DEVICE_WARNING),
+            },
+            image: ImageStatus {
+                commands: CommandSet::POSITION | CommandSet::VELOCITY | CommandSet::TORQUE,
+                actual: FeedbackSet::POSITION
+                    | FeedbackSet::VELOCITY
+                    | FeedbackSet::TORQUE
+                    | FeedbackSet::FOLLOWING_ERROR
+                    | FeedbackSet::CURRENT
+                    | FeedbackSet::BUS_VOLTAGE
+                    | FeedbackSet::TEMPERATURE,
+                position_command: Position(-1_234_567_890_046),
+                velocity_command: Velocity(-2_500_000_001),
+                torque_command: Torque(-333_334),
+                current: Current(1_250_000),
+                bus_voltage: Voltage(565_000_000),
+                temperature: Temperature(41_500),
+            },
         };
         status.axes[1] = AxisStatus {
             instance: 200,
@@ -615,6 +686,12 @@ pub(crate) mod tests {
                 line: Line { text: LineText::INIT_FAULT, code: 12 },
                 ..Indicators::NONE
             },
+            node: NodeStatus::Can {
+                state: BootState::Lost,
+                nmt: Some(NmtState::STOPPED),
+                emcy: Some((0x8130, ErrorRegister::COMMUNICATION)),
+            },
+            image: ImageStatus { actual: FeedbackSet::POSITION, ..ImageStatus::NONE },
             ..AxisStatus::NONE
         };
         status

@@ -50,6 +50,12 @@ impl Source {
         start
     }
 
+    /// The text of the first file; `None` where there is no file.
+    #[must_use]
+    pub fn first(&self) -> Option<Arc<str>> {
+        self.parts.first().map(|part| Arc::clone(&part.text))
+    }
+
     /// The path of the first file.
     #[must_use]
     pub fn path(&self) -> &str {

@@ -8,6 +8,7 @@ mod http;
 mod init;
 mod local;
 mod package;
+mod page;
 mod param;
 mod reload;
 mod scripts;

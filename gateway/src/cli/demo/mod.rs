@@ -6,6 +6,7 @@
 
 mod clocks;
 mod drives;
+mod page;
 
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
@@ -15,6 +16,7 @@ use std::time::{Duration, Instant};
 
 pub use self::clocks::DemoTime;
 pub use self::drives::{DRIVES, DriveKind, configuration};
+pub use self::page::PAGE;
 
 use self::clocks::Clocks;
 
@@ -65,6 +67,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let listen = clocks.as_ref().map_or(arguments.listen, |_| clocks::GATEWAY);
     let text = drives::configuration(&arguments.drives).replace(ADDRESS, &listen.to_string());
     let text = if clocks.is_some() { text.replace(clocks::SHARED, clocks::PTP) } else { text };
+    let text = arguments.page.map_or_else(|| text.clone(), |address| page::with_page(&text, address));
     let config = Config::parse(&text, "demo.toml")?;
     let mapping = Mapping::embedded()?;
     let seconds = f64::from(arguments.seconds);
@@ -77,7 +80,12 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
 
     let settings = Arc::new(Store::open(None)?);
     let start = || {
-        let extras = runner::Extras { capture: Some(&arguments.capture), local: None, histories: None };
+        let extras = runner::Extras {
+            capture: Some(&arguments.capture),
+            local: None,
+            configuration: Some(&text),
+            histories: None,
+        };
         runner::start(&config, mapping.clone(), extras, &settings).map_err(|error| in_use(error, listen))
     };
     let running = match &clocks {
@@ -89,6 +97,11 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
         config.axes.len(),
         drives::title(&arguments.drives)
     ));
+    if let Some(address) = arguments.page {
+        let url = page::url(address);
+        progress.step(&format!("page: {url}"));
+        page::open(&url);
+    }
     wait_until_ready(&running, &mut progress)?;
 
     let controller_config = setup::controller(&mapping, &counts, UPDATE_PERIOD_US);

@@ -1,11 +1,13 @@
 //! What the buses on CAN have in common: frames in and out, and the controller that is off the bus and comes back.
 
+use profile_generic::can::timing::Shape;
 use profile_generic::can::{Frame, Id};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::bus_return::BusReturn;
 use super::transmit_queue::TransmitQueue;
 use crate::engine::port::{CanInput, CanPort, CanSent};
+use crate::status::BusDetail;
 
 /// Frames taken from the bus in one call: more than a bus at 1 Mbit/s carries in ten milliseconds.
 const FRAMES_PER_CALL: usize = 256;
@@ -36,12 +38,38 @@ pub(super) trait Station {
 pub(super) struct CanLink {
     queue: TransmitQueue,
     back: BusReturn,
+    occupied: Occupied,
+}
+
+/// Bits for which frames have occupied the bus since the start: each frame counts with as many stuff bits as it could have.
+#[derive(Debug, Clone, Copy, Default)]
+struct Occupied {
+    nominal: u64,
+    data: u64,
+}
+
+impl Occupied {
+    fn count(&mut self, frame: &Frame) {
+        let bits = Shape::of(frame).most();
+        self.nominal += u64::from(bits.nominal);
+        self.data += u64::from(bits.data);
+    }
 }
 
 impl CanLink {
     /// Of a bus with this cycle.
     pub(super) const fn new(cycle_time: DurationNs) -> Self {
-        Self { queue: TransmitQueue::new(cycle_time), back: BusReturn::NEVER_LOST }
+        Self {
+            queue: TransmitQueue::new(cycle_time),
+            back: BusReturn::NEVER_LOST,
+            occupied: Occupied { nominal: 0, data: 0 },
+        }
+    }
+
+    /// For how many bits frames have occupied the bus.
+    pub(super) const fn detail(&self) -> BusDetail {
+        let Occupied { nominal, data } = self.occupied;
+        BusDetail::Can { nominal, data }
     }
 
     /// The cycle of the bus.
@@ -73,8 +101,12 @@ impl CanLink {
     pub(super) fn receive(&mut self, now: MonotonicTime, port: &mut dyn CanPort, station: &mut dyn Station) {
         for _ in 0..FRAMES_PER_CALL {
             match port.receive(now) {
-                Some(CanInput::Frame(_)) if !self.back.is_used() => {}
-                Some(CanInput::Frame(frame)) => station.handle_frame(now, &frame),
+                Some(CanInput::Frame(frame)) => {
+                    self.occupied.count(&frame);
+                    if self.back.is_used() {
+                        station.handle_frame(now, &frame);
+                    }
+                }
                 Some(CanInput::BusOff) => {
                     if self.back.lose(now) {
                         self.queue.clear();
@@ -107,7 +139,7 @@ impl CanLink {
         let mut failures = 0;
         while let Some((frame, made)) = self.queue.take().or_else(|| station.poll(now)) {
             match self.queue.send(now, port, frame, made) {
-                CanSent::Sent => {}
+                CanSent::Sent => self.occupied.count(&frame),
                 CanSent::Full => break,
                 CanSent::Failed => {
                     failures += 1;
@@ -227,6 +259,18 @@ mod tests {
         assert_eq!(link.send(late, &mut controller, &mut notes), 1);
         assert_eq!(notes.0, [format!("failed {}", frame(0x202).id())]);
         assert!(link.is_drained() && controller.1 == 1, "the third one is new");
+    }
+
+    #[test]
+    fn frames_that_pass_occupy_the_bus_and_one_that_waits_does_not() {
+        let mut link = CanLink::new(DurationNs::from_millis(4));
+        assert_eq!(link.detail(), BusDetail::Can { nominal: 0, data: 0 });
+        let mut notes = Notes::default();
+        link.receive(NOW, &mut Controller([CanInput::Frame(frame(0x181))].into(), 0), &mut notes);
+        notes.1.extend([frame(0x201), frame(0x202)]);
+        link.send(NOW, &mut Controller(VecDeque::new(), 1), &mut notes);
+        // 47 bits and 8 stuff bits each, of the frame that came and the one that was sent.
+        assert_eq!(link.detail(), BusDetail::Can { nominal: 2 * 55, data: 0 });
     }
 
     #[test]

@@ -26,6 +26,7 @@ use super::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
 use super::notice::Notice;
 use super::port::SouthPort;
 use crate::mapping::{Item, Mapping};
+use crate::status::{BusDetail, NodeStatus};
 
 /// What an access to a drive is for. Its answer comes back with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -155,6 +156,16 @@ pub trait South {
 
     /// Counters since the start.
     fn counts(&self) -> Counts;
+
+    /// What only a bus of its kind has.
+    fn detail(&self) -> BusDetail {
+        BusDetail::None
+    }
+
+    /// What is known of the node of an axis.
+    fn node(&self, _axis: usize) -> NodeStatus {
+        NodeStatus::Unknown
+    }
 
     /// Receives all waiting frames.
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>);
@@ -358,6 +369,12 @@ impl Buses {
     #[must_use]
     pub fn of(&self, axis: usize) -> usize {
         self.of[axis]
+    }
+
+    /// What is known of the node of an axis on its bus.
+    #[must_use]
+    pub fn node(&self, axis: usize) -> NodeStatus {
+        self.get(self.of(axis)).node(axis)
     }
 
     /// Starts an access to the drive of an axis. Returns `false` if there is no drive or too many accesses wait.

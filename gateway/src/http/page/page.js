@@ -36,9 +36,21 @@ function duration(seconds) {
 
 function span(nanoseconds) {
   const size = Math.abs(nanoseconds);
-  if (size >= 1e6) return `${nanoseconds / 1e6} ms`;
-  if (size >= 1e3) return `${nanoseconds / 1e3} µs`;
+  if (size >= 1e6) return `${Number((nanoseconds / 1e6).toFixed(3))} ms`;
+  if (size >= 1e3) return `${Number((nanoseconds / 1e3).toFixed(3))} µs`;
   return `${nanoseconds} ns`;
+}
+
+// The element of the value of a cell: a link where the cell has an address.
+function valueOf(cell, href) {
+  let value = cell.firstElementChild;
+  if (!href) return value;
+  if (value.tagName !== 'A') {
+    value.replaceWith(element('a', 'value'));
+    value = cell.firstElementChild;
+  }
+  if (value.getAttribute('href') !== href) value.setAttribute('href', href);
+  return value;
 }
 
 // Keeps one row for each name, so that focus, selection and scroll position survive an event.
@@ -59,7 +71,7 @@ function rows(body, items, labels, fill) {
       });
     }
     fill(item).forEach((cell, column) => {
-      const [value, more] = row.children[column].children;
+      const [value, more] = [valueOf(row.children[column], cell.href), row.children[column].lastElementChild];
       setText(value, cell.text);
       setClass(value, cell.tone || 'value');
       setText(more, cell.more || '');
@@ -110,7 +122,7 @@ function showBuses(buses) {
   rows(byId('buses'), buses, labels(BUS, 2), (bus) => {
     const phase = bus.phase === null ? '' : ` (CP${bus.phase})`;
     return [
-      { text: bus.name, more: bus.interface },
+      { text: bus.name, more: bus.interface, href: `#/bus/${encodeURIComponent(bus.name)}` },
       bus.up ? { text: `up${phase}`, tone: 'good' } : { text: `not in cyclic operation${phase}`, tone: 'bad' },
       { text: span(bus.cycle_ns) },
       { text: whole(bus.cycles) },
@@ -127,7 +139,7 @@ function axisCells(axis) {
   const tone = old ? 'old' : '';
   const mode = axis.mode === 'none' ? '' : `mode ${axis.mode}`;
   return [
-    { text: axis.name, more: axis.device ? `${axis.device} → ${drive}` : drive },
+    { text: axis.name, href: `#/axis/${axis.name}`, more: axis.device ? `${axis.device} → ${drive}` : drive },
     { text: axis.cip_state || 'not on a device', tone: stateTone(axis.cip_state || ''), more: axis.display },
     { text: axis.state, tone: stateTone(axis.state) },
     { text: axis.drive_status.join(', ') || 'nothing', tone, more: old ? 'last reported' : mode },
@@ -181,7 +193,7 @@ function showNotes(body, notes) {
   body.replaceChildren(row);
 }
 
-function showTime(time) {
+function showTime(time, target) {
   const pairs = [
     ['Source', time.source],
     ['Synchronized', time.synchronized ? 'yes' : 'no',
@@ -195,11 +207,11 @@ function showTime(time) {
     pairs.push(['Error', `below ${span(time.error_bound_ns)} of ${span(time.threshold_ns)}`]);
   }
   pairs.push(['Steps of the master', whole(time.steps)]);
-  list(byId('time'), pairs);
+  list(target, pairs);
 }
 
-function showCycles(cycles) {
-  list(byId('cycles'), [
+function showCycles(cycles, target) {
+  list(target, [
     ['Shortest cycle', span(cycles.cycle_ns)],
     ['Cycles', whole(cycles.count)],
     ['Late', `${whole(cycles.late)}, the latest by ${span(cycles.latest_ns)}`, lossTone(cycles.late)],
@@ -212,7 +224,7 @@ function showCycles(cycles) {
   ]);
 }
 
-function showHealth(health, status) {
+function showHealth(health) {
   const node = byId('health');
   setText(node, health.ready
     ? 'Ready: every bus is in cyclic operation, every axis is commissioned and without fault.'
@@ -222,7 +234,6 @@ function showHealth(health, status) {
   const texts = health.missing;
   while (items.children.length > texts.length) items.lastElementChild.remove();
   texts.forEach((text, index) => setText(items.children[index] || items.appendChild(element('li')), text));
-  document.title = `${status.name}: ${health.ready ? 'ready' : health.alive ? 'not ready' : 'not alive'}`;
 }
 
 const FAULTS_SHOWN = 20;
@@ -238,7 +249,7 @@ function showFaults({ faults }) {
   rows(byId('faults'), faults.slice(0, FAULTS_SHOWN), labels(FAULT, FAULT.length), (fault) => {
     const code = fault.drive_code ? `0x${fault.drive_code.toString(16).toUpperCase().padStart(4, '0')}` : '';
     return [
-      { text: fault.axis, more: [fault.bus, fault.drive].filter(Boolean).join(', ') },
+      { text: fault.axis, href: `#/axis/${fault.axis}`, more: [fault.bus, fault.drive].filter(Boolean).join(', ') },
       { text: fault.cause, tone: fault.end ? '' : 'bad', more: fault.gateway || '' },
       { text: when(fault.time) },
       fault.end
@@ -278,17 +289,24 @@ async function fetchHistory(name, path, number, showIt) {
   }
 }
 
-function show({ health, status, history }) {
+// The head of every view.
+function showHead({ health, status }) {
   setText(byId('name'), status.name);
   const connected = status.connections === 1 ? '1 controller' : `${status.connections} controllers`;
   // Whether it is ready stands below, with what is missing.
   setText(byId('summary'), `Axisbridge ${status.version}, ${connected}, up ${duration(status.uptime_s)}`);
-  showHealth(health, status);
+  const { view, name } = wanted();
+  const place = view === 'overview' ? '' : `${name || view} – `;
+  document.title = `${place}${status.name}: ${health.ready ? 'ready' : health.alive ? 'not ready' : 'not alive'}`;
+}
+
+function showOverview({ health, status, history }) {
+  showHealth(health);
   showDevices(status.devices);
   showBuses(status.buses);
   showAxes(status.axes);
-  showTime(status.time);
-  showCycles(status.cycles);
+  showTime(status.time, byId('time'));
+  showCycles(status.cycles, byId('cycles'));
   fetchHistory('faults', '/api/v1/faults', history.faults, showFaults);
   fetchHistory('log', `/api/v1/log?lines=${LINES_SHOWN}`, history.log, showLog);
 }

@@ -43,6 +43,7 @@ use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::{DriveIdentity, Item, Mapping};
+use crate::status::{BusDetail, NodeStatus};
 
 /// Axes of one device.
 const AXES_MAX: usize = 8;
@@ -490,6 +491,20 @@ impl South for CanBus {
             lost: statistics.pdos_missed,
             refused: FrameRefusal::ALL.iter().map(|reason| statistics.refused(*reason)).sum(),
         }
+    }
+
+    fn detail(&self) -> BusDetail {
+        self.link.detail()
+    }
+
+    fn node(&self, axis: usize) -> NodeStatus {
+        let device = self.places.of(axis).and_then(|(device, _)| self.devices.get(device));
+        let info = device.and_then(|device| self.master.node(device.node));
+        info.map_or(NodeStatus::Unknown, |info| NodeStatus::Can {
+            state: info.state,
+            nmt: info.heartbeat,
+            emcy: info.emcy.map(|emcy| (emcy.code.0, emcy.register)),
+        })
     }
 
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {

@@ -40,6 +40,7 @@ use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
 use crate::mapping::devicenet::ROW_LEN;
 use crate::mapping::{DriveProgram, Item, Mapping};
+use crate::status::{BusDetail, NodeStatus};
 
 /// The connection that carries the commands.
 const POLL: ConnectionKind = ConnectionKind::Poll;
@@ -475,6 +476,20 @@ impl South for DevicenetBus {
             lost: statistics.missed,
             refused: statistics.refused + self.refused,
         }
+    }
+
+    fn detail(&self) -> BusDetail {
+        self.link.detail()
+    }
+
+    fn node(&self, axis: usize) -> NodeStatus {
+        let drive = self.places.of(axis).and_then(|place| self.drives.get(place));
+        let phase = drive.and_then(|drive| self.master.phase(drive.plan.mac));
+        let facts = drive.and_then(|drive| self.master.facts(drive.plan.mac));
+        phase.map_or(NodeStatus::Unknown, |phase| NodeStatus::Devicenet {
+            phase,
+            status: facts.and_then(|facts| facts.status),
+        })
     }
 
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {

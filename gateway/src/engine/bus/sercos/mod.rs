@@ -17,12 +17,12 @@ use profile_sercos::master::Master;
 use profile_sercos::master::config::{ConfigError, ConnectionConfig, Connections, MasterConfig};
 use profile_sercos::master::connection::{Consumer, ConsumerState};
 use profile_sercos::master::event::{
-    Event, HotPlugRefusal, Output, Refusal as FrameRefusal, SlaveId, Ticket,
+    Event, HotPlugRefusal, Output, Port, Refusal as FrameRefusal, SlaveId, Ticket,
 };
 use profile_sercos::master::station::Presence;
 use profile_sercos::master::svc::request::{SvcData, SvcFailure, SvcOperation, SvcOutcome, SvcRequest};
 use profile_sercos::wire::data_status::{CommandState, DataStatus};
-use profile_sercos::wire::header::Phase;
+use profile_sercos::wire::header::{Kind, Phase};
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::scp::ScpClass;
@@ -41,6 +41,7 @@ use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
 use crate::engine::notice::Notice;
 use crate::engine::port::{FRAME_MAX, SouthPort};
 use crate::mapping::{DriveFacts, DriveProgram, Full, Item, Mapping, SercosAxis, SercosError};
+use crate::status::{BusDetail, NodeStatus, PortLosses};
 
 /// The connection in the MDT, by its number at the slave.
 pub const COMMAND_CONNECTION: u8 = 0;
@@ -629,6 +630,23 @@ impl South for SercosBus {
             lost: statistics.at_missing,
             refused: FrameRefusal::ALL.iter().map(|reason| statistics.refused(*reason)).sum(),
         }
+    }
+
+    fn detail(&self) -> BusDetail {
+        let statistics = self.master.statistics();
+        let lost = |port, kind| u32::try_from(statistics.lost(port, kind)).unwrap_or(u32::MAX);
+        let of_port = |port| PortLosses { mdt: lost(port, Kind::Mdt), at: lost(port, Kind::At) };
+        BusDetail::Sercos { topology: self.master.topology(), lost: [of_port(Port::One), of_port(Port::Two)] }
+    }
+
+    fn node(&self, axis: usize) -> NodeStatus {
+        let slave = self.drive_of(axis).and_then(|drive| drive.slave);
+        let info = slave.and_then(|slave| self.master.slave(slave));
+        info.map_or(NodeStatus::Unknown, |info| NodeStatus::Sercos {
+            place: info.id.topology_address(),
+            presence: info.presence,
+            status: info.status,
+        })
     }
 
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>) {
