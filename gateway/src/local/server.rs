@@ -574,7 +574,10 @@ mod tests {
             names,
             kinds,
             parameters: vec![code],
-            catalogue: Catalogue::new(vec![Bus::Sercos, Bus::Devicenet], &Mapping::embedded().unwrap()),
+            catalogue: Catalogue::new(
+                vec![Bus::Sercos, Bus::Devicenet { attributes: Vec::new() }],
+                &Mapping::embedded().unwrap(),
+            ),
             status,
             installation: Installation {
                 name: "cell".to_owned(),
