@@ -412,6 +412,8 @@ fn only_the_explicit_connection_of_a_devicenet_drive_is_allocated_and_it_is_give
     assert!(list.contains(line) && list.ends_with("bus=devicenet source=dictionary\n"), "{list}");
     let ended = session.now;
     drop(session);
+    // What was sent last arrives.
+    network.0.borrow_mut().bus.advance(ended + DurationNs::from_millis(10));
     let value =
         with_drive(&network, |slave| slave.application().device().attribute(0, 441).unwrap().to_vec());
     assert_eq!(value, 75.5_f32.to_le_bytes(), "in the drive");

@@ -812,7 +812,7 @@ mod tests {
         let mut client = bench.connect().await;
         say(&mut client, "list y\n").await;
         assert_eq!(hear(&mut client).await, "parameter code access=write unit=mHz\n");
-        assert_eq!(hear(&mut client).await, "ok list y 1 bus=devicenet source=overlays\n");
+        assert_eq!(hear(&mut client).await, "ok list y 1 bus=devicenet source=dictionary\n");
     }
 
     #[tokio::test]

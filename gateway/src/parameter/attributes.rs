@@ -156,7 +156,7 @@ mod tests {
         let mapping = Mapping::embedded().unwrap();
         let motion = attributes(&DevicenetKind::Motion { modes: Vec::new(), resolution: 1 }, &mapping);
         let kept = motion.iter().filter(|known| known.is_kept).count();
-        assert_eq!((motion.len(), kept), (459, 267));
+        assert_eq!((motion.len(), kept), (459, 258));
         let mut ids: Vec<String> = motion.iter().map(|known| known.id.to_string()).collect();
         ids.sort();
         ids.dedup();
@@ -165,5 +165,16 @@ mod tests {
         let speed = DevicenetKind::Speed { assembly: Assembly(21), scale: 0 };
         let speed = attributes(&speed, &mapping);
         assert!(speed.len() == 7 && speed.iter().all(|known| !known.is_kept), "{speed:?}");
+    }
+
+    #[test]
+    fn what_an_overlay_adds_to_the_dictionary_is_a_parameter_like_others() {
+        let overlay = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/overlays/vendor-parameter.toml");
+        let mapping = Mapping::load(None, &[overlay.into()]).unwrap();
+        let all = attributes(&DevicenetKind::Motion { modes: Vec::new(), resolution: 1 }, &mapping);
+        let id = Id::parse("66.1.2001").unwrap();
+        let notch = all.iter().find(|known| known.id == id).expect("the attribute of the overlay");
+        assert_eq!((notch.name.as_str(), notch.unit.as_str()), ("Notch Frequency", "Hertz"));
+        assert_eq!((notch.kind, notch.is_kept), (Kind::Object(Cia402Type::F32), true));
     }
 }

@@ -208,7 +208,7 @@ fn a_devicenet_drive_is_replaced() {
         let printed = param(&gateway, &["backup", "turntable", name]);
         assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
         let counts = format!(
-            "20 parameters of turntable in {name}\n247 parameters of the list are not in this drive\n"
+            "20 parameters of turntable in {name}\n238 parameters of the list are not in this drive\n"
         );
         assert_eq!(printed.out, counts);
         let backup = fs::read_to_string(&file).expect("the backup");

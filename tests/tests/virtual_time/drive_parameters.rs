@@ -448,7 +448,7 @@ fn a_devicenet_drive_is_backed_up_lost_replaced_restored_compared_and_moved() {
     assert_eq!(told, ["Kpp", "f32", "Radians/Sec", "Set", "75.5"], "{object}");
     assert_eq!(bench.object("read turntable 1.1.7")["value"], "simulated drive");
     let (kept, absent) = backup(&mut bench);
-    assert_eq!((kept.len(), absent), (20, 247));
+    assert_eq!((kept.len(), absent), (20, 238));
     assert_eq!(kept["66.1.441"], "00009742");
     // States, commands and data sets are not parameters.
     for id in ["66.1.40", "66.1.90", "66.1.361", "66.1.650"] {
