@@ -490,7 +490,8 @@ fn a_devicenet_drive_is_backed_up_lost_replaced_restored_compared_and_moved() {
         Move::Dwell { seconds: 0.5 },
         Move::Disable(turntable),
     ]);
-    bench.rig.run_until(millis(30_000), "the end of the program", |rig| rig.report().outcome.is_some());
+    let report = bench.rig.run(millis(30_000));
+    assert!(report.failure.is_none(), "{:?} {}", report.failure, bench.rig.told());
     let went = turns(&bench.rig) - start;
     assert!((went - 0.5).abs() < 0.002, "{went} {}", bench.rig.told());
     assert_eq!((real(&bench.rig, 441), real(&bench.rig, 461)), (75.5, 300.0), "after all that as well");

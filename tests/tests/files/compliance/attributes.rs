@@ -33,7 +33,7 @@ fn is_required(row: &CipAttribute) -> bool {
 #[derive(Debug, Default)]
 pub struct Clause {
     pub kinds: BTreeMap<&'static str, usize>,
-    missing: Vec<u16>,
+    pub missing: Vec<u16>,
 }
 
 impl Clause {

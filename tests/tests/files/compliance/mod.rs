@@ -12,20 +12,17 @@ use self::clauses::Table;
 use self::named_tests::{named_tests, root, why_not};
 
 /// A page in `docs/` and how many tests it names at least: fewer are a page that is not read rightly.
-const PAGES: [(&str, &str, usize); 4] = [
-    ("compliance-cip-motion.md", include_str!("../../../../docs/compliance-cip-motion.md"), 150),
-    ("sercos.md", include_str!("../../../../docs/sercos.md"), 150),
-    ("canopen.md", include_str!("../../../../docs/canopen.md"), 60),
-    ("architecture.md", include_str!("../../../../docs/architecture.md"), 50),
-];
+const PAGES: [(&str, usize); 4] =
+    [("compliance-cip-motion.md", 150), ("sercos.md", 150), ("canopen.md", 60), ("architecture.md", 50)];
 
 const ACCEPT: &str = "AXISBRIDGE_ACCEPT";
 
 #[test]
 fn every_test_that_a_page_names_exists_and_runs() {
     let root = root();
-    for (name, page, least) in PAGES {
-        let tests = named_tests(page);
+    for (name, least) in PAGES {
+        let page = std::fs::read_to_string(root.join("docs").join(name)).expect("the page is there");
+        let tests = named_tests(&page);
         assert!(tests.len() > least, "only {} tests were found in docs/{name}", tests.len());
         let missing: Vec<_> = tests.iter().filter_map(|test| why_not(&root, test).err()).collect();
         assert!(missing.is_empty(), "named in docs/{name}:\n{}", missing.join("\n"));
