@@ -451,7 +451,7 @@ fn a_devicenet_drive_is_backed_up_lost_replaced_restored_compared_and_moved() {
     assert_eq!((kept.len(), absent), (20, 238));
     assert_eq!(kept["66.1.441"], "00009742");
     // States, commands and data sets are not parameters.
-    for id in ["66.1.40", "66.1.90", "66.1.361", "66.1.650"] {
+    for id in ["66.1.40", "66.1.89", "66.1.90", "66.1.650"] {
         assert!(
             !kept.contains_key(id) && bench.say(&format!("read turntable {id} brief")).starts_with("ok"),
             "{id}"

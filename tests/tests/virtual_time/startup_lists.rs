@@ -559,7 +559,7 @@ fn a_devicenet_drive_that_is_not_as_its_list_says_is_left_out_and_the_other_goes
         // Axis State can only be read.
         (
             entry("0x42.1.650", "99", "type = \"u8\""),
-            "writing 66.1.650 = 99 (it is 8): the drive refuses it with status 0x0e: ",
+            "writing 66.1.650 = 99 (it is 0): the drive refuses it with status 0x0e: ",
         ),
         (entry("0x77.1.3", "1", "type = \"u8\""), "119.1.3: the drive refuses it with status 0x16: "),
     ];
