@@ -11,27 +11,19 @@ use profile_cia402::wire::{Function, NodeId, cob_id};
 use profile_generic::can::Frame;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
+use super::can_wire::{CanWire, FRAMES_PER_STEP};
 use super::{Line, Stage};
 use crate::engine::bus::can::direct;
 use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
-use crate::engine::port::{CanInput, CanPort, CanSent};
+use crate::engine::port::CanPort;
 use crate::mapping::Object;
-
-/// Frames taken in one step at most.
-const FRAMES_PER_STEP: usize = 64;
-
-/// How often what does not fit the transmit queue is offered again.
-const FULL_PAUSE: DurationNs = DurationNs::from_millis(1);
-
-/// How long the transmit queue may stay full: then nobody acknowledges what is sent.
-const STUCK_MAX: DurationNs = DurationNs::from_secs(1);
 
 /// Longest time for an answer.
 const PATIENCE: DurationNs = DurationNs::from_millis(500);
 
 /// The bus, and the device on it.
 pub struct CanLine {
-    port: Box<dyn CanPort>,
+    wire: CanWire,
     node: NodeId,
     client: Client,
     /// The statusword of each axis.
@@ -39,9 +31,6 @@ pub struct CanLine {
     stage: Stage,
     /// Nothing is sent before then.
     listens_until: Option<MonotonicTime>,
-    /// What the transmit queue had no room for, and since when.
-    held: Option<(Frame, MonotonicTime)>,
-    again: Option<MonotonicTime>,
 }
 
 impl CanLine {
@@ -51,14 +40,12 @@ impl CanLine {
         let client = Client::new(ClientConfig { timeout: PATIENCE, ..ClientConfig::default() });
         let statusword = |axis| Target::Object(Object { index: STATUSWORD + axis * AXIS_OFFSET, sub: 0 });
         Self {
-            port,
+            wire: CanWire::new(port),
             node,
             client,
             statuswords: axes.into_iter().map(statusword).collect(),
             stage: Stage::Starting,
             listens_until: None,
-            held: None,
-            again: None,
         }
     }
 
@@ -76,42 +63,21 @@ impl CanLine {
             _ => Ok(()),
         }
     }
-
-    fn send(&mut self, now: MonotonicTime) -> Result<(), String> {
-        self.again = None;
-        loop {
-            let next = self.held.take().or_else(|| {
-                let bytes = self.client.poll(now)?;
-                Some((Frame::new(cob_id::sdo_request(self.node), &bytes).ok()?, now))
-            });
-            let Some((frame, since)) = next else { return Ok(()) };
-            if self.port.send(now, &frame) == CanSent::Full {
-                if now.since(since) > STUCK_MAX {
-                    return Err("no station of the bus acknowledges what is sent".to_owned());
-                }
-                (self.held, self.again) = (Some((frame, since)), Some(now + FULL_PAUSE));
-                return Ok(());
-            }
-        }
-    }
 }
 
 impl Line for CanLine {
     fn step(&mut self, now: MonotonicTime) -> Result<Stage, String> {
         for _ in 0..FRAMES_PER_STEP {
-            match self.port.receive(now) {
-                Some(CanInput::Frame(frame)) => self.take_frame(now, &frame)?,
-                Some(CanInput::BusOff) => return Err("the interface is off the bus".to_owned()),
-                Some(CanInput::BusOn) => {}
-                None => break,
-            }
+            let Some(frame) = self.wire.receive(now)? else { break };
+            self.take_frame(now, &frame)?;
         }
         let listens_until = *self.listens_until.get_or_insert(now + LISTEN);
         if self.stage == Stage::Starting && now >= listens_until {
             self.stage = Stage::Ready;
         }
         if self.stage == Stage::Ready {
-            self.send(now)?;
+            let Self { wire, client, node, .. } = self;
+            wire.send(now, || Frame::new(cob_id::sdo_request(*node), &client.poll(now)?).ok())?;
         }
         Ok(self.stage.clone())
     }
@@ -120,7 +86,7 @@ impl Line for CanLine {
         match self.stage {
             Stage::Starting => self.listens_until,
             // Nothing else can be done while the queue is full.
-            _ => self.again.or_else(|| self.client.wake_at()),
+            _ => self.wire.wake_at().or_else(|| self.client.wake_at()),
         }
     }
 

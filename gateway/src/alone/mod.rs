@@ -6,10 +6,12 @@
 //! ```
 //!
 //! Lines and replies are those of local control, and so are the [`Job`]s that answer them; a [`Line`] takes the place of the engine.
-//! It goes no further than parameters need: a SERCOS line to CP2, CANopen devices to no other state than they are in. There is no
-//! cycle, no telegram has a control word in it, and the jobs write none: no axis can be enabled.
+//! It goes no further than parameters need: a SERCOS line to CP2, CANopen devices to no other state than they are in, of a drive on
+//! DeviceNet the explicit connection. There is no cycle, no telegram has a control word in it, and the jobs write none: no axis can be enabled.
 
 pub mod can;
+mod can_wire;
+pub mod devicenet;
 pub mod sercos;
 
 #[cfg(test)]
@@ -132,7 +134,7 @@ impl Session {
             Ok(_) => return Err(format!("`{line}` needs a gateway that runs")),
             Err(BadRequest::Parameter { name }) if !Id::is_meant(&name) => {
                 return Err(format!(
-                    "`{name}` is a name, which needs a gateway that runs: expected a number such as S-0-0100 or 6081h"
+                    "`{name}` is a name, which needs a gateway that runs: expected a number such as S-0-0100, 6081h or 66.1.504"
                 ));
             }
             Err(error) => return Ok(protocol::bad(line, &error)),

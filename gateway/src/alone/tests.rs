@@ -5,6 +5,11 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use profile_cia402::wire::{Function, NodeId};
+use profile_cip::devicenet::master::config::{DataRate, MasterConfig as DevicenetMaster, SlaveConfig};
+use profile_cip::devicenet::slave::Slave;
+use profile_cip::devicenet::slave::motion_drive::MotionDrive;
+use profile_cip::devicenet::wire::speed::Assembly;
+use profile_cip::devicenet::wire::{Identifier, MacId};
 use profile_generic::can::Frame;
 use profile_generic::can::bus as wire;
 use profile_generic::can::timing::BitRate;
@@ -16,13 +21,17 @@ use profile_sercos::wire::header::Phase;
 use profile_sercos::wire::idn::Idn;
 
 use super::can::CanLine;
+use super::devicenet::DevicenetLine;
 use super::sercos::SercosLine;
 use super::*;
+use crate::config::DevicenetKind;
 use crate::engine::port::{CanInput, CanPort, CanSent, EthernetPort};
 use crate::mapping::Mapping;
+use crate::parameter::attributes::attributes;
 use crate::parameter::known::Bus;
 use crate::simulate::can_bus::InProcessCan;
 use crate::simulate::can_drive::{DriveNode, drive};
+use crate::simulate::devicenet_drive::{self, DevicenetNode};
 use crate::simulate::drives::{DriveNetwork, SIMULATED_MAC, drives};
 
 /// Two drives in a line, with the checker.
@@ -147,7 +156,7 @@ fn refusals_are_those_of_the_drive_and_of_the_gateway() {
         ("read y S-0-0104", "`read y S-0-0104` needs a gateway that runs"),
         (
             "read x notch",
-            "`notch` is a name, which needs a gateway that runs: expected a number such as S-0-0100 or 6081h",
+            "`notch` is a name, which needs a gateway that runs: expected a number such as S-0-0100, 6081h or 66.1.504",
         ),
     ] {
         assert_eq!(session.ask(request).unwrap_err(), why);
@@ -296,7 +305,206 @@ fn a_bus_of_another_master_is_left_alone() {
 #[test]
 fn an_interrupted_start_ends_at_once() {
     let line = CanLine::new(Box::new(can()), NodeId::new(2).unwrap(), [0]);
-    let catalogue = Catalogue::new(vec![Bus::Devicenet], &Mapping::embedded().unwrap());
+    let catalogue = Catalogue::new(vec![Bus::Sercos], &Mapping::embedded().unwrap());
     let opened = Session::open(Box::new(line), wait(BEGIN), (names(), 0), catalogue, || false);
     assert_eq!(opened.err().unwrap(), "interrupted");
+}
+
+/// A network with one simulated drive, and what was sent to it.
+struct Network {
+    bus: InProcessCan<DevicenetNode>,
+    sent: Vec<Frame>,
+    /// What another station sends next.
+    foreign: Option<Frame>,
+    /// What the drive answers of its state instead of what it has.
+    state: Option<u8>,
+}
+
+impl CanPort for Shared<Network> {
+    fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
+        let mut network = self.0.borrow_mut();
+        let foreign = network.foreign.take().map(CanInput::Frame);
+        let input = foreign.or_else(|| network.bus.receive(now))?;
+        match (input, network.state) {
+            // The second fragment of a list with the one attribute 650: status, and the value.
+            (CanInput::Frame(frame), Some(state)) if matches!(frame.data(), [_, 0x81, 0, _]) => {
+                let mut data = frame.data().to_vec();
+                data[3] = state;
+                Some(CanInput::Frame(Frame::new(frame.id(), &data).unwrap()))
+            }
+            (input, _) => Some(input),
+        }
+    }
+
+    fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent {
+        let mut network = self.0.borrow_mut();
+        network.sent.push(*frame);
+        network.bus.send(now, frame)
+    }
+}
+
+fn mac(number: u8) -> MacId {
+    MacId::new(number).unwrap()
+}
+
+fn motion() -> DevicenetKind {
+    DevicenetKind::Motion { modes: Vec::new(), resolution: 1_000 }
+}
+
+fn network(kind: &DevicenetKind) -> Shared<Network> {
+    let mut bus = wire::Bus::new(BitRate::classic(500_000).unwrap());
+    for number in 0..64 {
+        bus.share(Identifier::DuplicateMacCheck(mac(number)).can());
+    }
+    let drive = devicenet_drive::node(mac(5), DataRate::Rate500, kind);
+    let bus = InProcessCan::new(bus, vec![drive], None);
+    Shared(Rc::new(RefCell::new(Network { bus, sent: Vec::new(), foreign: None, state: None })))
+}
+
+/// A session of a master with MAC ID 1.
+fn open_devicenet(network: &Shared<Network>, number: u8, kind: &DevicenetKind) -> Result<Session, String> {
+    open_from(network, number, kind, BEGIN)
+}
+
+fn open_from(
+    network: &Shared<Network>,
+    number: u8,
+    kind: &DevicenetKind,
+    from: MonotonicTime,
+) -> Result<Session, String> {
+    let cycle = DurationNs::from_millis(10);
+    let mut config = DevicenetMaster::new(mac(1), 0x0539, 7, DataRate::Rate500, cycle);
+    config.slaves.push(SlaveConfig::explicit(mac(number)));
+    let line = DevicenetLine::new(config, Box::new(network.clone()), mac(number), kind).unwrap();
+    let mapping = Mapping::embedded().unwrap();
+    let bus = Bus::Devicenet { attributes: attributes(kind, &mapping) };
+    let catalogue = Catalogue::new(vec![bus], &mapping);
+    Session::open(Box::new(line), wait(from), (vec!["x".to_owned()], 0), catalogue, || true)
+}
+
+fn with_drive<T>(network: &Shared<Network>, look: impl FnOnce(&Slave<MotionDrive>) -> T) -> T {
+    match network.0.borrow().bus.nodes().next() {
+        Some(DevicenetNode::Motion(slave)) => look(slave),
+        _ => panic!("a CIP Motion drive"),
+    }
+}
+
+#[test]
+fn only_the_explicit_connection_of_a_devicenet_drive_is_allocated_and_it_is_given_back() {
+    let network = network(&motion());
+    let mut session = open_devicenet(&network, 5, &motion()).unwrap();
+    assert_eq!(with_drive(&network, Slave::master), Some(mac(1)));
+    let written = ask(&mut session, "write x 66.1.441 75.5");
+    let expected = "ok write x {\"id\":\"66.1.441\",\"name\":\"Kpp\",\"type\":\"f32\",\"unit\":\"Radians/Sec\",\
+                    \"access\":\"Set\",\"value\":\"75.5\",\"before\":\"50\",\"data\":\"00009742\"}\n";
+    assert_eq!(written, expected);
+    assert!(ask(&mut session, "read x 1.1.7").contains("\"value\":\"simulated drive\""));
+    for (request, reply) in [
+        ("read x 66.1.610", "error read x absent: 66.1.610: the drive refuses it with status 0x14: "),
+        ("write x 66.1.441 1001", "error write x value: 66.1.441: the drive refuses it with status 0x09: "),
+        ("write x 66.1.89 1", "error write x gateway: 66.1.89 is not written: the gateway sets it for its "),
+    ] {
+        let answer = ask(&mut session, request);
+        assert!(answer.starts_with(reply), "{request}: {answer}");
+    }
+    let list = ask(&mut session, "list x backup");
+    let line = "parameter 66.1.504 access=Set type=f32 name=Torque Limit - Positive\n";
+    assert!(list.contains(line) && list.ends_with("bus=devicenet source=dictionary\n"), "{list}");
+    let ended = session.now;
+    drop(session);
+    // What was sent last arrives.
+    network.0.borrow_mut().bus.advance(ended + DurationNs::from_millis(10));
+    let value =
+        with_drive(&network, |slave| slave.application().device().attribute(0, 441).unwrap().to_vec());
+    assert_eq!(value, 75.5_f32.to_le_bytes(), "in the drive");
+    assert_eq!(with_drive(&network, Slave::master), None, "given back");
+    let allowed = [
+        Identifier::DuplicateMacCheck(mac(1)),
+        Identifier::UnconnectedRequest(mac(5)),
+        Identifier::ExplicitRequest(mac(5)),
+    ];
+    let is_allowed = |frame: &Frame| allowed.iter().any(|identifier| identifier.can() == frame.id());
+    assert!(network.0.borrow().sent.iter().all(is_allowed), "no poll, and nothing to anybody else");
+    // The drive has kept it.
+    let mut session = open_from(&network, 5, &motion(), ended + DurationNs::from_secs(1)).unwrap();
+    assert!(ask(&mut session, "read x 66.1.441 brief").contains("\"value\":\"75.5\""));
+}
+
+#[test]
+fn nothing_is_written_to_a_devicenet_drive_that_has_torque() {
+    let network = network(&motion());
+    let mut session = open_devicenet(&network, 5, &motion()).unwrap();
+    // Starting, Running, Testing, Stopping, Aborting, and a state that nobody knows.
+    for state in [3, 4, 5, 6, 7, 11] {
+        network.0.borrow_mut().state = Some(state);
+        let reply = "error write x torque: 66.1.441: parameters are not written while the drive has torque\n";
+        assert_eq!(ask(&mut session, "write x 66.1.441 9"), reply, "{state}");
+    }
+    let value =
+        with_drive(&network, |slave| slave.application().device().attribute(0, 441).unwrap().to_vec());
+    assert_eq!(value, 50.0_f32.to_le_bytes(), "in the drive");
+    // Stopped.
+    network.0.borrow_mut().state = Some(2);
+    assert!(ask(&mut session, "write x 66.1.441 9").starts_with("ok write x "));
+}
+
+#[test]
+fn a_velocity_drive_is_asked_for_the_state_of_its_supervisor() {
+    let kind = DevicenetKind::Speed { assembly: Assembly(21), scale: 0 };
+    let network = network(&kind);
+    let mut session = open_devicenet(&network, 5, &kind).unwrap();
+    let list = ask(&mut session, "list x backup");
+    assert_eq!(list, "ok list x 0 bus=devicenet source=dictionary\n", "no table has its attributes");
+    assert!(ask(&mut session, "read x 0x2A.1.22 brief").starts_with("ok read x "));
+    let state = Target::Attribute { class: 0x29, instance: 1, attribute: 6 };
+    assert_eq!(session.line.torque_reports(), [state]);
+    let torque = |code: u8| session.line.has_torque(&[code]);
+    let codes: Vec<u8> = (0..=8).filter(|code| torque(*code)).collect();
+    assert_eq!(
+        codes,
+        [0, 4, 5, 6, 8],
+        "vendor specific, enabled, stopping, fault stop, and what nobody knows"
+    );
+    assert!(session.line.has_torque(&[]) && session.line.has_torque(&[3, 0]));
+}
+
+#[test]
+fn a_devicenet_drive_of_another_master_is_left_alone() {
+    let polled = network(&motion());
+    let poll = Frame::new(Identifier::PollCommand(mac(5)).can(), &[]).unwrap();
+    polled.0.borrow_mut().foreign = Some(poll);
+    let why = open_devicenet(&polled, 5, &motion()).err().unwrap();
+    assert!(
+        why.starts_with("slave 5: another master polls it") && why.ends_with("; the drive is left alone"),
+        "{why}"
+    );
+    // One that is allocated and not polled refuses.
+    let taken = network(&motion());
+    let mut session = open_devicenet(&taken, 5, &motion()).unwrap();
+    let allocate = Frame::new(Identifier::UnconnectedRequest(mac(5)).can(), &[2, 0x4B, 3, 1, 1, 2]).unwrap();
+    assert!(ask(&mut session, "read x 1.1.1").starts_with("ok read x "));
+    let ended = session.now;
+    drop(session);
+    let then = ended + DurationNs::from_millis(100);
+    assert_eq!(taken.0.borrow_mut().bus.send(then, &allocate), CanSent::Sent);
+    let sent = taken.0.borrow().sent.len();
+    let why = open_from(&taken, 5, &motion(), then + DurationNs::from_millis(10)).err().unwrap();
+    assert_eq!(why, "another master has the drive with MAC ID 5: it is left alone");
+    assert_eq!(with_drive(&taken, Slave::master), Some(mac(2)), "it is still the other one's");
+    let releases =
+        taken.0.borrow().sent[sent..].iter().filter(|frame| frame.data().get(1) == Some(&0x4C)).count();
+    assert_eq!(releases, 0, "nobody gives it back for the other one");
+}
+
+#[test]
+fn a_devicenet_drive_that_is_not_there_or_whose_mac_id_the_gateway_has_is_named() {
+    let why = open_devicenet(&network(&motion()), 7, &motion()).err().unwrap();
+    assert_eq!(why, "the drive with MAC ID 7: no answer (allocate)");
+    let network = network(&motion());
+    let response =
+        Frame::new(Identifier::DuplicateMacCheck(mac(1)).can(), &[0x80, 1, 0, 9, 0, 0, 0]).unwrap();
+    network.0.borrow_mut().foreign = Some(response);
+    let why = open_devicenet(&network, 5, &motion()).err().unwrap();
+    assert!(why.contains("MAC ID 1"), "{why}");
+    assert_eq!(with_drive(&network, Slave::master), None);
 }

@@ -12,6 +12,7 @@ use crate::engine::build::{can, devicenet, sercos};
 use crate::finding::registry as code;
 use crate::finding::{Findings, Problem, Source, Spanned};
 use crate::mapping::{Cia402Type, IdnUnit, Mapping};
+use crate::parameter::attributes::attributes;
 use crate::parameter::id::Id;
 use crate::parameter::known::objects;
 use crate::parameter::startup::{StartupEntry, StartupValue};
@@ -66,10 +67,14 @@ pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Finding
             let mut tables = south.devicenet.iter().flat_map(|table| &table.get_ref().drive);
             let named = |table: &&Spanned<DevicenetDriveTable>| is_named(&table.get_ref().name, &drive.name);
             let Some(table) = tables.find(named) else { continue };
-            for (entry, table) in own(&drive.startup, &table.get_ref().startup, |table| &table.parameter) {
+            let table = table.get_ref();
+            list.file(&drive.startup, table.startup_file.as_ref(), &reserved);
+            let known = attributes(&drive.kind, mapping);
+            for (entry, table) in own(&drive.startup, &table.startup, |table| &table.parameter) {
+                let known =
+                    known.iter().find(|known| known.id == entry.id).and_then(|known| known.data_type());
                 if list.is_free(entry, table.parameter.span(), &reserved) {
-                    // No table has the types of attributes.
-                    list.object(entry, table.parameter.span(), table.value.span(), None);
+                    list.object(entry, table.parameter.span(), table.value.span(), known);
                 }
             }
         }

@@ -866,6 +866,10 @@ pub struct DevicenetDriveTable {
     /// What attributes of the drive have to be before it takes part in the cycle: its start-up list. Default: none.
     #[serde(default)]
     pub startup: Vec<Spanned<AttributeStartupTable>>,
+    /// A backup made by `axisbridge param backup` as start-up list, below the entries of `startup`. A path relative to the folder of this
+    /// file. Default: none.
+    #[schemars(transform = form::path)]
+    pub startup_file: Option<Spanned<String>>,
     /// What is done when the drive has another value, for entries that do not say it: `"write"` writes the value and reads it back,
     /// `"refuse"` does not use the drive, `"warn"` logs it. Default: `"write"`.
     #[schemars(transform = form::word(&OnDifference::NAMED))]
@@ -881,8 +885,8 @@ pub struct AttributeStartupTable {
     pub parameter: Spanned<String>,
     /// The value: a number, or a text as `axisbridge param read` shows it, such as `"hex:0a00"`.
     pub value: Spanned<Scalar>,
-    /// The type of the attribute, such as `"f32"` for a REAL or `"i8"` for a SINT. Required unless the value has its own, as `"hex:0a00"`
-    /// and `"u16:5"` have.
+    /// The type of the attribute, such as `"f32"` for a REAL or `"i8"` for a SINT. Default: that of the dictionary, which has the attributes
+    /// of the Motion Device Axis Object (class 66). Required of others, unless the value has its own type, as `"hex:0a00"` and `"u16:5"`.
     #[serde(rename = "type")]
     #[schemars(transform = form::word(Cia402Type::NAMED))]
     pub kind: Option<Spanned<String>>,

@@ -54,6 +54,14 @@ pub(super) fn load(folder: &Path, written: &mut Written, findings: &mut Findings
             list(path, table.on_startup_difference.as_ref(), "canopen", &mut drive.startup);
         }
     }
+    let devicenet = config.devicenet.iter_mut().flat_map(|network| &mut network.drives);
+    let tables = south.devicenet.iter().flat_map(|table| &table.get_ref().drive);
+    for (drive, table) in devicenet.zip(tables) {
+        let table = table.get_ref();
+        if let Some(path) = &table.startup_file {
+            list(path, table.on_startup_difference.as_ref(), "devicenet", &mut drive.startup);
+        }
+    }
     good
 }
 
@@ -133,7 +141,8 @@ impl Loader<'_> {
         for kept in &table.parameter {
             let id = Id::parse(kept.id.get_ref()).filter(|id| match self.bus {
                 "sercos" => matches!(id, Id::Idn(_)),
-                _ => matches!(id, Id::Object(_)),
+                "canopen" => matches!(id, Id::Object(_)),
+                _ => matches!(id, Id::Path { .. }),
             });
             let data = unhex(kept.data.get_ref());
             if id.is_none() {

@@ -580,7 +580,10 @@ mod tests {
             names,
             kinds,
             parameters: vec![code],
-            catalogue: Catalogue::new(vec![Bus::Sercos, Bus::Devicenet], &Mapping::embedded().unwrap()),
+            catalogue: Catalogue::new(
+                vec![Bus::Sercos, Bus::Devicenet { attributes: Vec::new() }],
+                &Mapping::embedded().unwrap(),
+            ),
             status,
             installation: Installation {
                 name: "cell".to_owned(),
@@ -815,7 +818,7 @@ mod tests {
         let mut client = bench.connect().await;
         say(&mut client, "list y\n").await;
         assert_eq!(hear(&mut client).await, "parameter code access=write unit=mHz\n");
-        assert_eq!(hear(&mut client).await, "ok list y 1 bus=devicenet source=overlays\n");
+        assert_eq!(hear(&mut client).await, "ok list y 1 bus=devicenet source=dictionary\n");
     }
 
     #[tokio::test]

@@ -109,6 +109,9 @@ pub struct Kept<T = String> {
     /// Its name, for people.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
+    /// Its type, for people; empty where nobody says.
+    #[serde(default, skip_serializing_if = "String::is_empty", rename = "type")]
+    pub kind: String,
     /// Its value, for people.
     #[serde(default)]
     pub value: String,
@@ -218,6 +221,7 @@ pub(crate) mod tests {
         Kept {
             id: "S-0-0104".to_owned(),
             name: "Position loop Kv-factor".to_owned(),
+            kind: "2 byte unsigned, 2 decimals".to_owned(),
             value: "1.50".to_owned(),
             unit: "1000/min".to_owned(),
             attribute: "0x02110001".to_owned(),

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use profile_cia402::drive::index::{AXIS_OFFSET, on_first_axis};
 use profile_sercos::wire::idn::Idn;
 
+use super::attributes::{KnownAttribute, attributes};
 use super::id::Id;
 use crate::config::{Can, CanDrive, Config, DriveAt, KnownObject, is_set_by_gateway};
+use crate::mapping::devicenet::{motion, speed};
 use crate::mapping::{Cia402Dictionary, Dictionaries, Mapping, Object};
 
 /// The bus of a drive, with what is known of the drive.
@@ -21,9 +23,15 @@ pub enum Bus {
         /// The objects of this axis and of the device, in the order of their numbers.
         objects: Vec<KnownObject>,
     },
-    /// DeviceNet: there is no list.
-    Devicenet,
+    /// DeviceNet.
+    Devicenet {
+        /// What the dictionary has of the drive, in the order of the numbers.
+        attributes: Vec<KnownAttribute>,
+    },
 }
+
+/// A drive of which nothing is known.
+static UNKNOWN: Bus = Bus::Devicenet { attributes: Vec::new() };
 
 impl Bus {
     /// Its name in replies and files.
@@ -32,7 +40,7 @@ impl Bus {
         match self {
             Self::Sercos => "sercos",
             Self::Can { .. } => "canopen",
-            Self::Devicenet => "devicenet",
+            Self::Devicenet { .. } => "devicenet",
         }
     }
 
@@ -43,7 +51,7 @@ impl Bus {
             (self, id),
             (Self::Sercos, Id::Idn(_))
                 | (Self::Can { .. }, Id::Object(_))
-                | (Self::Devicenet, Id::Path { .. })
+                | (Self::Devicenet { .. }, Id::Path { .. })
         )
     }
 
@@ -52,6 +60,13 @@ impl Bus {
     pub fn object(&self, object: Object) -> Option<&KnownObject> {
         let Self::Can { objects, .. } = self else { return None };
         objects.iter().find(|known| known.object == object)
+    }
+
+    /// What is known of an attribute of the drive.
+    #[must_use]
+    pub fn attribute(&self, id: Id) -> Option<&KnownAttribute> {
+        let Self::Devicenet { attributes } = self else { return None };
+        attributes.iter().find(|known| known.id == id)
     }
 }
 
@@ -68,7 +83,11 @@ impl Catalogue {
     pub fn of(config: &Config, mapping: &Mapping) -> Self {
         let axes = config.axes.iter().map(|axis| match axis.drive {
             DriveAt::Sercos { .. } => Bus::Sercos,
-            DriveAt::Devicenet { .. } => Bus::Devicenet,
+            DriveAt::Devicenet { .. } => {
+                let drive = config.devicenet_drive(axis);
+                let known = drive.map(|(_, drive)| attributes(&drive.kind, mapping));
+                Bus::Devicenet { attributes: known.unwrap_or_default() }
+            }
             DriveAt::Can { .. } => {
                 let (source, objects) = config
                     .can_drive(axis)
@@ -88,7 +107,7 @@ impl Catalogue {
     /// The drive of an axis.
     #[must_use]
     pub fn bus(&self, axis: usize) -> &Bus {
-        self.axes.get(axis).unwrap_or(&Bus::Devicenet)
+        self.axes.get(axis).unwrap_or(&UNKNOWN)
     }
 
     /// The name of an IDN in the tables, without asking a drive.
@@ -174,9 +193,13 @@ pub fn belongs_to_gateway(id: Id) -> Option<&'static str> {
             0x1200..=0x1BFF => Some(COMMUNICATION),
             _ => None,
         },
-        Id::Path { class, .. } => match class {
+        Id::Path { class, attribute, .. } => match (class, attribute) {
             // DeviceNet, message router, connections, assemblies.
-            0x02..=0x05 => Some(COMMUNICATION),
+            (0x02..=0x05, _) => Some(COMMUNICATION),
+            // Control Status, data sets, Command Control.
+            (motion::CLASS, 89..=97) => Some(COMMUNICATION),
+            // Control Mode, Feedback Mode, Event Checking Control; set-points; trims.
+            (motion::CLASS, 40 | 42 | 60 | 360..=364 | 431 | 451 | 481 | 491) => Some(COMMAND),
             _ => None,
         },
     }
@@ -204,7 +227,16 @@ pub fn rescales(id: Id) -> bool {
             ),
             _ => false,
         },
-        // Nothing is known of the others: those of a drive profile decide nothing that is read at the start.
+        // Nothing is read from the drive at the start: the configuration says what the drive is to be.
+        Id::Path { class: motion::CLASS, attribute, .. } => match attribute {
+            // Ratio of the feedbacks, scaling, unit, resolution, polarity, unwind; polarity of the motor; gear and actuator.
+            44 | 45 | 77..=79 | 83 | 84 | 1317 | 1370..=1377 => true,
+            // Units, polarity, resolution and range of each feedback channel.
+            1400..=1599 => matches!(attribute % 50, 10 | 11 | 14 | 16..=19),
+            _ => false,
+        },
+        // The program of a velocity drive knows the scale of its speed.
+        Id::Path { class: speed::CLASS_DRIVE, attribute, .. } => attribute == speed::SPEED_SCALE,
         Id::Path { .. } => false,
     }
 }
@@ -230,20 +262,48 @@ mod tests {
             "1600h.1",
             "1017h",
             "1010h.1",
+            "3.1.1",
+            "0x42.1.40",
+            "0x42.1.89",
+            "0x42.1.97",
+            "0x42.1.361",
+            "0x42.1.451",
         ] {
             assert!(belongs_to_gateway(id(text)).is_some(), "{text}");
         }
-        for text in ["S-0-0100", "P-0-0134", "S-0-0091", "6081h", "2001h", "60FBh.1", "1.1.7", "0x2A.1.22"] {
+        for text in [
+            "S-0-0100",
+            "P-0-0134",
+            "S-0-0091",
+            "6081h",
+            "2001h",
+            "60FBh.1",
+            "1.1.7",
+            "0x2A.1.22",
+            "66.1.504",
+        ] {
             assert_eq!(belongs_to_gateway(id(text)), None, "{text}");
         }
     }
 
     #[test]
     fn scaling_is_known_on_every_axis_of_a_device() {
-        for text in ["S-0-0076", "S-0-0079", "S-0-0123", "6091h.1", "0x6891.2", "607Eh", "608Fh.1"] {
+        for text in [
+            "S-0-0076",
+            "S-0-0079",
+            "S-0-0123",
+            "6091h.1",
+            "0x6891.2",
+            "607Eh",
+            "608Fh.1",
+            "66.1.78",
+            "66.1.1371",
+            "66.1.1466",
+            "0x2A.1.22",
+        ] {
             assert!(rescales(id(text)), "{text}");
         }
-        for text in ["S-0-0100", "P-0-0076", "6081h", "0x6081.0", "2091h", "1.1.7"] {
+        for text in ["S-0-0100", "P-0-0076", "6081h", "0x6081.0", "2091h", "1.1.7", "66.1.504", "66.1.1434"] {
             assert!(!rescales(id(text)), "{text}");
         }
     }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | a number | `-12.5`, with as many decimals as the drive says; also read: `0x1F`, `0b101` |
 //! | bits of a SERCOS drive | `0b0000000001001010` |
-//! | a list | its items with commas: `S-0-0040,S-0-0051` |
+//! | a list, or an array of an attribute | its items with commas: `S-0-0040,S-0-0051` |
 //! | text | the text |
 //! | what nobody knows the type of | its bytes in the drive's order: `hex:0a000000` |
 //!
@@ -27,8 +27,12 @@ const DECIMALS_MAX: usize = 15;
 pub enum Kind {
     /// Operation data of an IDN with this attribute.
     Sercos(Attribute),
-    /// An object of this type.
+    /// An object, or an attribute of DeviceNet, of this type.
     Object(Cia402Type),
+    /// An array of an attribute of DeviceNet: the type of its elements, and how many; 0 for any number.
+    Array(Cia402Type, u16),
+    /// A text of CIP: one byte with its length, and so many characters.
+    ShortString,
     /// Nobody knows.
     Unknown,
 }
@@ -55,12 +59,15 @@ pub enum ValueError {
 }
 
 impl Kind {
-    /// What it is, for people: `2 byte unsigned, 1 decimals`, `u32`; empty when nobody knows.
+    /// What it is, for people: `2 byte unsigned, 1 decimals`, `u32`, `u8[64]`; empty when nobody knows.
     #[must_use]
     pub fn describe(self) -> String {
         match self {
             Self::Sercos(attribute) => attribute.to_string(),
             Self::Object(kind) => kind.name().to_owned(),
+            Self::Array(kind, 0) => format!("{}[]", kind.name()),
+            Self::Array(kind, count) => format!("{}[{count}]", kind.name()),
+            Self::ShortString => "string".to_owned(),
             Self::Unknown => String::new(),
         }
     }
@@ -71,6 +78,8 @@ impl Kind {
         let text = match self {
             Self::Sercos(attribute) => operation_data(attribute, data),
             Self::Object(kind) => object(kind, data),
+            Self::Array(kind, _) => array(kind, data),
+            Self::ShortString => short_string(data),
             Self::Unknown => None,
         };
         text.unwrap_or_else(|| format!("hex:{}", hex(data)))
@@ -85,6 +94,7 @@ impl Kind {
             Some(("hex", bytes)) => {
                 unhex(bytes).ok_or_else(|| bad(bytes, "bytes of two hexadecimal digits"))?
             }
+            Some(("text", text)) if self == Self::ShortString => short_string_bytes(text)?,
             Some(("text", text)) => text.as_bytes().to_vec(),
             Some((name, value)) if self == Self::Unknown => {
                 let named = Cia402Type::NAMED.iter().find(|(known, _)| *known == name);
@@ -94,6 +104,8 @@ impl Kind {
             _ => match self {
                 Self::Sercos(attribute) => operation_bytes(attribute, text)?,
                 Self::Object(kind) => object_bytes(kind, text)?,
+                Self::Array(kind, count) => array_bytes(kind, count, text)?,
+                Self::ShortString => short_string_bytes(text)?,
                 Self::Unknown => return Err(ValueError::Untyped(text.to_owned())),
             },
         };
@@ -198,7 +210,7 @@ fn operation_item_bytes(attribute: Attribute, text: &str) -> Result<Vec<u8>, Val
     }
 }
 
-// ---- CANopen ---------------------------------------------------------------------------------------------------
+// ---- CANopen, and numbers of DeviceNet -------------------------------------------------------------------------
 
 fn object(kind: Cia402Type, data: &[u8]) -> Option<String> {
     match kind {
@@ -233,6 +245,38 @@ fn object_bytes(kind: Cia402Type, text: &str) -> Result<Vec<u8>, ValueError> {
         Cia402Type::Bool => bad(text, "0 or 1"),
         _ => bad(text, range(len, is_signed(kind), 0)),
     })
+}
+
+// ---- DeviceNet -------------------------------------------------------------------------------------------------
+
+fn array(kind: Cia402Type, data: &[u8]) -> Option<String> {
+    let items = data.chunks(len(kind)?).map(|item| object(kind, item));
+    items.collect::<Option<Vec<_>>>().map(|items| items.join(","))
+}
+
+fn array_bytes(kind: Cia402Type, count: u16, text: &str) -> Result<Vec<u8>, ValueError> {
+    let items: Vec<_> = text.split(',').filter(|_| !text.is_empty()).collect();
+    if count > 0 && items.len() != usize::from(count) {
+        return Err(bad(text, format!("{count} items with commas")));
+    }
+    let mut bytes = Vec::new();
+    for item in items {
+        bytes.extend(object_bytes(kind, item.trim())?);
+        if bytes.len() > DATA_MAX {
+            return Err(ValueError::TooLong);
+        }
+    }
+    Ok(bytes)
+}
+
+fn short_string(data: &[u8]) -> Option<String> {
+    let (len, rest) = data.split_first()?;
+    (usize::from(*len) == rest.len()).then(|| text(rest))
+}
+
+fn short_string_bytes(text: &str) -> Result<Vec<u8>, ValueError> {
+    let len = u8::try_from(text.len()).map_err(|_| bad(text, "a text of at most 255 bytes"))?;
+    Ok([&[len], text.as_bytes()].concat())
 }
 
 /// Bytes of a number of this type; `None` for texts and bytes.
@@ -385,6 +429,10 @@ mod tests {
             (Kind::Object(T::F64), &[0, 0, 0, 0, 0, 0, 0x49, 0x40], "50"),
             (Kind::Object(T::VisibleString), b"axis", "axis"),
             (Kind::Object(T::Domain), &[1, 0xAB], "hex:01ab"),
+            (Kind::Array(T::U8, 3), &[255, 3, 0], "255,3,0"),
+            (Kind::Array(T::I16, 0), &[0xFF, 0xFF, 1, 0], "-1,1"),
+            (Kind::ShortString, b"\x05axis ", "axis "),
+            (Kind::ShortString, b"\x06hex:01", "text:hex:01"),
             (Kind::Unknown, &[1, 2, 3], "hex:010203"),
         ] {
             assert_eq!(kind.decode(data), text, "{kind:?}");
@@ -398,6 +446,9 @@ mod tests {
         assert_eq!(sercos(Two, Format::Unsigned, 0).decode(&[1, 2, 3]), "hex:010203");
         assert_eq!(list(Four, Format::Idn).decode(&[1, 2, 3, 4, 5]), "hex:0102030405");
         assert_eq!(Kind::Object(Cia402Type::U32).decode(&[1]), "hex:01");
+        assert_eq!(Kind::Array(Cia402Type::U16, 2).decode(&[1, 0, 2]), "hex:010002");
+        assert_eq!(Kind::ShortString.decode(b"\x02abc"), "hex:02616263");
+        assert_eq!(Kind::ShortString.decode(&[]), "hex:");
         assert_eq!(list(ItemLength::One, Format::Text).decode(b"caf\xE9\0\0"), "caf\u{e9}");
         let marked = list(ItemLength::One, Format::Text);
         assert_eq!(marked.encode(&marked.decode(b"hex:01")), Ok(b"hex:01".to_vec()), "not taken for bytes");
@@ -446,6 +497,9 @@ mod tests {
             "`S-0-1300.0.3` is not an IDN of 16 bits"
         );
         assert_eq!(told(list(One, Format::Unsigned), "1,256"), "`256` is not a number from 0 to 255");
+        assert_eq!(told(Kind::Array(Cia402Type::U8, 3), "1,2"), "`1,2` is not 3 items with commas");
+        assert_eq!(told(Kind::Array(Cia402Type::U8, 2), "1,256"), "`256` is not a number from 0 to 255");
+        assert!(told(Kind::ShortString, &"x".repeat(256)).ends_with(" is not a text of at most 255 bytes"));
         assert_eq!(list(One, Format::Text).encode(&"x".repeat(DATA_MAX + 1)), Err(ValueError::TooLong));
         assert_eq!(list(One, Format::Unsigned).encode(&"1,".repeat(DATA_MAX + 1)), Err(ValueError::TooLong));
     }
@@ -472,6 +526,8 @@ mod tests {
             let _ = Kind::Sercos(Attribute(word)).encode(&text);
             let _ = Kind::Unknown.encode(&text);
             let _ = Kind::Object(Cia402Type::I32).encode(&text);
+            let _ = Kind::Array(Cia402Type::F32, 0).encode(&text);
+            let _ = Kind::ShortString.encode(&text);
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use arrayvec::ArrayString;
-use profile_cip::device::attribute::{Access, AttributeDefinition, DataType, Scope};
+use profile_cip::device::attribute::{Access, AttributeDefinition, DataType, DefaultValue, Scope};
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::device::config::{DEVICE_TYPE_CIP_MOTION_DRIVE, IdentityConfig};
 use profile_cip::devicenet::access::AccessState;
@@ -25,14 +25,32 @@ use super::drive_events::setup::Setup;
 use super::drive_events::{Change, Shown};
 use crate::config::{Devicenet, DevicenetDrive, DevicenetKind};
 
-/// Attributes that hold limits, which the box writes: number and name of the standard.
-const LIMITS: [(u16, &str); 5] = [
-    (444, "Position Error Tolerance"),
-    (485, "Acceleration Limit"),
-    (486, "Deceleration Limit"),
-    (504, "Torque Limit - Positive"),
-    (505, "Torque Limit - Negative"),
+/// Attributes that the drive keeps: number, type, value as it comes from its maker, greatest value where there is one (the least is 0
+/// then), name of the standard. Those of the box's limits are the first five.
+const ATTRIBUTES: [(u16, DataType, u16, Option<u16>, &str); 18] = [
+    (444, DataType::Real, 0, None, "Position Error Tolerance"),
+    (485, DataType::Real, 0, None, "Acceleration Limit"),
+    (486, DataType::Real, 0, None, "Deceleration Limit"),
+    (504, DataType::Real, 0, None, "Torque Limit - Positive"),
+    (505, DataType::Real, 0, None, "Torque Limit - Negative"),
+    (440, DataType::Real, 100, Some(200), "Kvff"),
+    (441, DataType::Real, 50, Some(1_000), "Kpp"),
+    (442, DataType::Real, 0, Some(1_000), "Kpi"),
+    (461, DataType::Real, 250, Some(5_000), "Kvp"),
+    (462, DataType::Real, 100, Some(5_000), "Kvi"),
+    (469, DataType::Real, 1_000, Some(10_000), "Velocity Low Pass Filter Bandwidth"),
+    (502, DataType::Real, 2_000, Some(10_000), "Torque Low Pass Filter Bandwidth"),
+    (503, DataType::Real, 0, Some(4_000), "Torque Notch Filter Frequency"),
+    (1315, DataType::Usint, 1, Some(3), "Motor Type"),
+    (1319, DataType::Real, 2, Some(50), "Motor Rated Continuous Current"),
+    (1320, DataType::Real, 6, Some(150), "Motor Rated Peak Current"),
+    (1329, DataType::Uint, 8, Some(100), "Rotary Motor Poles"),
+    (1331, DataType::Real, 3_000, Some(12_000), "Rotary Motor Rated Speed"),
 ];
+
+/// Cycles of its encoder in a revolution, and counts in a cycle: they can be set to what they are.
+const ENCODER: [(u16, &str); 2] =
+    [(1416, "Feedback 1 Cycle Resolution"), (1417, "Feedback 1 Cycle Interpolation")];
 
 /// Axis Fault (attribute 657) of what can be wrong with the servo.
 const AXIS_FAULTS: [(FaultCause, u8); 2] =
@@ -114,12 +132,8 @@ pub fn node_with(
     let wrong = |error: &dyn fmt::Display| format!("MAC ID {drive} cannot work as it is set up: {error}");
     match kind {
         DevicenetKind::Motion { resolution, .. } => {
-            let attribute = |(id, name): &(u16, &str)| AttributeDefinition {
-                settable_in_running: true,
-                ..AttributeDefinition::new(Scope::Instance, *id, DataType::Real, Access::Set, name)
-            };
             let config = MotionDriveConfig {
-                attributes: LIMITS.iter().map(attribute).collect(),
+                attributes: attributes(*resolution),
                 faults: AXIS_FAULTS.to_vec(),
                 servo: setup.servo(
                     drive,
@@ -139,6 +153,29 @@ pub fn node_with(
             Ok(DevicenetNode::Speed(slave(mac, DEVICE_TYPE_AC_DRIVE, rate, speed)))
         }
     }
+}
+
+/// The attributes of a CIP Motion drive with so many counts in a revolution.
+fn attributes(resolution: u32) -> Vec<AttributeDefinition> {
+    let new = |id, data_type, name| AttributeDefinition {
+        settable_in_running: true,
+        ..AttributeDefinition::new(Scope::Instance, id, data_type, Access::Set, name)
+    };
+    let kept = ATTRIBUTES.iter().map(|(id, data_type, default, greatest, name)| AttributeDefinition {
+        default: match data_type {
+            DataType::Real => DefaultValue::Real(f64::from(*default)),
+            _ => DefaultValue::Integer(i64::from(*default)),
+        },
+        range: greatest.map(|greatest| (0.0, f64::from(greatest))),
+        ..new(*id, *data_type, name)
+    });
+    let encoder = ENCODER.iter().zip([resolution, 1]).map(|((id, name), value)| AttributeDefinition {
+        settable_in_running: false,
+        default: DefaultValue::Integer(i64::from(value)),
+        range: Some((f64::from(value), f64::from(value))),
+        ..new(*id, DataType::Udint, name)
+    });
+    kept.chain(encoder).collect()
 }
 
 impl DevicenetNode {

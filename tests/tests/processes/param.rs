@@ -188,6 +188,81 @@ fn a_canopen_drive_is_backed_up_changed_and_restored() {
     });
 }
 
+/// The drives are in the process of the gateway: those of the next one are others.
+#[test]
+fn a_devicenet_drive_is_replaced() {
+    in_real_time("a_devicenet_drive_is_replaced", || {
+        let text = include_str!("../virtual_time/devicenet.toml").replace("10.0.0.2", "127.0.0.90");
+        let start = |name: &str| {
+            let gateway = Gateway::with(name, &text);
+            gateway.connect().until("status turntable", "ok status turntable state=inhibited owner=nobody ");
+            gateway
+        };
+        let gateway = start("param-devicenet-old");
+        let printed = param(&gateway, &["write", "turntable", "66.1.441", "75.5"]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert_eq!(printed.out, "66.1.441 = 75.5 Radians/Sec (was 50)\n");
+        let file = path("param-devicenet-backup.toml");
+        let _ = fs::remove_file(&file);
+        let name = file.to_str().expect("a path");
+        let printed = param(&gateway, &["backup", "turntable", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        let counts = format!(
+            "20 parameters of turntable in {name}\n238 parameters of the list are not in this drive\n"
+        );
+        assert_eq!(printed.out, counts);
+        let backup = fs::read_to_string(&file).expect("the backup");
+        for part in [
+            "bus = \"devicenet\"\nsource = \"dictionary\"\n",
+            "product_name = \"simulated drive\"\n",
+            "vendor = \"1\"\n",
+            "id = \"66.1.441\"\nname = \"Kpp\"\ntype = \"f32\"\nvalue = \"75.5\"\nunit = \"Radians/Sec\"\n",
+            "id = \"66.1.1315\"\nname = \"Motor Type\"\ntype = \"u8\"\nvalue = \"1\"\ndata = \"01\"\n",
+        ] {
+            assert!(backup.contains(part), "{part} in {backup}");
+        }
+        stop(gateway);
+
+        // Another drive, as it comes from its maker.
+        let gateway = start("param-devicenet-new");
+        let printed = param(&gateway, &["compare", "turntable", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(1), ""), "{printed:?}");
+        let table =
+            "parameter  backup  drive  name\n66.1.441   75.5    50     Kpp\n\n1 of 20 parameters differ\n";
+        assert_eq!(printed.out, table);
+        let of_others = changed(&file, "product_code = \"1\"", "product_code = \"9\"");
+        let printed = param(&gateway, &["restore", "turntable", &of_others]);
+        assert_eq!((printed.code, printed.out.as_str()), (Some(1), ""));
+        let expected =
+            "the backup is of another type of drive:\n  product_code: 9 in the backup, 1 in the drive\n";
+        assert_eq!(printed.errors, expected);
+        // 1e9 is beyond what the drive takes: that is said, and the exit status says it too.
+        let refused = changed(&file, "data = \"00009742\"", "data = \"286b6e4e\"");
+        let printed = param(&gateway, &["restore", "turntable", &refused]);
+        assert_eq!(printed.code, Some(1), "{printed:?}");
+        let expected = "not restored: 66.1.441 = 75.5: 66.1.441: the drive refuses it with status 0x09: ";
+        assert!(printed.errors.starts_with(expected), "{printed:?}");
+        let printed = param(&gateway, &["restore", "turntable", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        let expected =
+            "66.1.441 = 75.5\n1 of 20 parameters were written, 19 were the same, 0 were not restored\n";
+        assert_eq!(printed.out, expected);
+        let printed = param(&gateway, &["compare", "turntable", name]);
+        assert_eq!(
+            (printed.code, printed.out.as_str()),
+            (Some(0), "20 parameters are the same\n"),
+            "{printed:?}"
+        );
+
+        let mut client = gateway.connect();
+        client.until("enable turntable", "ok enable turntable state=operating owner=local ");
+        let reply = client.ask("move turntable 0.25 velocity=1 acceleration=5 by=gateway");
+        assert!((value(&reply, "position=") - 0.25).abs() < 0.002, "{reply}");
+        drop(client);
+        stop(gateway);
+    });
+}
+
 /// The objects of a command with `--json`.
 fn objects(printed: &Printed) -> Vec<serde_json::Value> {
     printed.out.lines().map(|line| serde_json::from_str(line).expect("an object")).collect()
@@ -358,6 +433,16 @@ fn drives_are_accessed_without_a_gateway() {
         let printed = can(&["write", "turntable", "6040h", "15"]);
         assert_eq!((printed.code, printed.out.as_str()), (Some(1), ""));
         assert_eq!(printed.errors, "6040:00 is not written: the gateway commands the drive with it\n");
+
+        let devicenet = config("alone-devicenet.toml", include_str!("../virtual_time/devicenet.toml"));
+        let devicenet = |words: &[&str]| param_with(words, &["--alone", "--config", &devicenet]);
+        let printed = devicenet(&["write", "turntable", "66.1.441", "60"]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert_eq!(printed.out, "66.1.441 = 60 Radians/Sec (was 50)\n");
+        let printed = devicenet(&["backup", "slide", name]);
+        assert_eq!((printed.code, printed.errors.as_str()), (Some(0), ""), "{printed:?}");
+        assert!(printed.out.starts_with("20 parameters of slide in "), "{printed:?}");
+        assert_eq!(devicenet(&["compare", "turntable", name]).code, Some(0));
 
         let printed = can(&["read", "nobody", "6081h"]);
         assert_eq!((printed.code, printed.out.as_str()), (Some(1), ""));

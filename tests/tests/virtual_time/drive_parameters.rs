@@ -1,6 +1,8 @@
 //! Parameters of drives by the number that they have there: a line of local control, its accesses in the engine and on the bus, the
 //! drive, and the reply.
 
+use std::collections::BTreeMap;
+
 use axisbridge::config::Config;
 use axisbridge::engine::axis::Owner;
 use axisbridge::engine::direct::{DirectEnd, DirectNorth, DirectRequest};
@@ -12,13 +14,16 @@ use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cia402::node::dictionary::{self, DataType};
 use profile_cia402::wire::Mux;
-use profile_cip::controller::{AxisSet, Step as Move};
+use profile_cip::controller::{AxisSet, Limits, Step as Move};
+use profile_generic::cast::f64_from_i64;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::DriveState;
 use profile_sercos::slave::parameter::Definition;
 use profile_sercos::wire::idn::Idn;
 
-/// The axes of both configurations.
+use super::startup_lists::{real, replace_devicenet_drive};
+
+/// The axes of all configurations.
 const AXES: [&str; 2] = ["turntable", "slide"];
 
 /// A box with local control, and a client.
@@ -56,6 +61,11 @@ impl Bench {
         let mut rig = Rig::new(settings);
         prepare(&mut rig);
         Self::new(rig, &configuration)
+    }
+
+    fn devicenet() -> Self {
+        let configuration = include_str!("devicenet.toml");
+        Self::new(Rig::new(Settings::without_line(configuration.to_owned())), configuration)
     }
 
     /// The reply to a line.
@@ -404,4 +414,92 @@ fn lists_say_where_they_are_from() {
         "{list}"
     );
     assert!(list.ends_with(" bus=canopen source=dictionary\n") && !list.contains("6040:00"), "{list}");
+}
+
+/// Values of the drive of the turntable by their numbers, as hexadecimal bytes; and how many of the list it does not have.
+fn backup(bench: &mut Bench) -> (BTreeMap<String, String>, usize) {
+    let list = bench.say("list turntable backup");
+    let (mut values, mut absent) = (BTreeMap::new(), 0);
+    for line in list.lines().filter_map(|line| line.strip_prefix("parameter ")) {
+        let id = line.split(' ').next().expect("a number");
+        let reply = bench.say(&format!("read turntable {id} brief"));
+        if reply.starts_with("error read turntable absent: ") {
+            absent += 1;
+            continue;
+        }
+        let object: serde_json::Value =
+            serde_json::from_str(&reply[reply.find('{').unwrap_or_else(|| panic!("{reply}"))..])
+                .expect("an object");
+        values.insert(id.to_owned(), object["data"].as_str().expect("bytes").to_owned());
+    }
+    (values, absent)
+}
+
+/// A drive is backed up and lost. Another one in its place has other values; they are restored, seen in the drive, and the axis moves.
+#[test]
+fn a_devicenet_drive_is_backed_up_lost_replaced_restored_compared_and_moved() {
+    let mut bench = Bench::devicenet();
+    for (id, value) in [("66.1.441", "75.5"), ("0x42.1.461", "300"), ("66.1.1315", "2")] {
+        let object = bench.object(&format!("write turntable {id} {value}"));
+        assert_eq!(object["value"], value, "{object}");
+    }
+    let object = bench.object("read turntable 66.1.441");
+    let told = ["name", "type", "unit", "access", "value"].map(|key| object[key].as_str().expect(key));
+    assert_eq!(told, ["Kpp", "f32", "Radians/Sec", "Set", "75.5"], "{object}");
+    assert_eq!(bench.object("read turntable 1.1.7")["value"], "simulated drive");
+    let (kept, absent) = backup(&mut bench);
+    assert_eq!((kept.len(), absent), (20, 238));
+    assert_eq!(kept["66.1.441"], "00009742");
+    // States, commands and data sets are not parameters.
+    for id in ["66.1.40", "66.1.89", "66.1.90", "66.1.650"] {
+        assert!(
+            !kept.contains_key(id) && bench.say(&format!("read turntable {id} brief")).starts_with("ok"),
+            "{id}"
+        );
+    }
+
+    replace_devicenet_drive(&mut bench.rig);
+    assert_eq!((real(&bench.rig, 441), real(&bench.rig, 461)), (50.0, 250.0), "as it comes from its maker");
+    bench.rig.run_until(millis(20_000), "the new drive", |rig| rig.engine.axes()[0].south().is_some());
+    let (found, _) = backup(&mut bench);
+    let differ: Vec<_> = kept.iter().filter(|(id, data)| found[*id] != **data).collect();
+    let ids: Vec<_> = differ.iter().map(|(id, _)| id.as_str()).collect();
+    assert_eq!(ids, ["66.1.1315", "66.1.441", "66.1.461"]);
+    for (id, data) in differ {
+        let reply = bench.say(&format!("write turntable {id} hex:{data}"));
+        assert!(reply.starts_with("ok write turntable "), "{reply}");
+    }
+    assert_eq!((real(&bench.rig, 441), real(&bench.rig, 461)), (75.5, 300.0), "{}", bench.rig.told());
+    assert_eq!(backup(&mut bench).0, kept);
+    let command = "write turntable 66.1.362 1";
+    let refused =
+        "error write turntable gateway: 66.1.362 is not written: the gateway commands the drive with it\n";
+    assert_eq!(bench.say(command), refused);
+
+    let start = turns(&bench.rig);
+    let limits = Limits { velocity: 1.0, acceleration: 5.0, jerk: 50.0 };
+    let turntable = AxisSet::one(1);
+    bench.rig.connect(vec![
+        Move::FaultReset(turntable),
+        Move::Enable(turntable),
+        Move::MoveRelative { axis: 1, distance: 0.5, limits },
+        Move::Dwell { seconds: 0.5 },
+        Move::Disable(turntable),
+    ]);
+    let report = bench.rig.run(millis(30_000));
+    assert!(report.failure.is_none(), "{:?} {}", report.failure, bench.rig.told());
+    let went = turns(&bench.rig) - start;
+    assert!((went - 0.5).abs() < 0.002, "{went} {}", bench.rig.told());
+    assert_eq!((real(&bench.rig, 441), real(&bench.rig, 461)), (75.5, 300.0), "after all that as well");
+    // Its encoder is what it is.
+    bench.rig.run_for(millis(500));
+    let encoder = "write turntable 66.1.1416 4096";
+    let refused = "error write turntable value: 66.1.1416: the drive refuses it with status 0x09: ";
+    assert!(bench.say(encoder).starts_with(refused), "{}", bench.say(encoder));
+}
+
+/// Turns of the motor of the first drive on DeviceNet.
+fn turns(rig: &Rig) -> f64 {
+    let drive = rig.devicenet[0].bus.nodes().next().expect("a drive");
+    f64_from_i64(drive.actual().position.get()) / 1e9
 }

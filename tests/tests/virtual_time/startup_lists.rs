@@ -6,7 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use axisbridge::simulate::devicenet_drive::DevicenetNode;
+use axisbridge::config::DevicenetKind;
+use axisbridge::simulate::can_bus::CanNode as _;
+use axisbridge::simulate::devicenet_drive::{self, DevicenetNode};
 use axisbridge::simulate::drives::linear;
 use axisbridge_tests::rig::motion::{NANO, TURNTABLE, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
@@ -16,6 +18,8 @@ use profile_cia402::node::drive::Device;
 use profile_cia402::wire::Mux;
 use profile_cia402::wire::nmt::NmtState;
 use profile_cip::controller::{AxisSet, Step};
+use profile_cip::devicenet::master::config::DataRate;
+use profile_cip::devicenet::wire::MacId;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::DriveState;
 use profile_sercos::slave::communication::CLASSES_WITH_HOT_PLUG;
@@ -69,12 +73,26 @@ fn devicenet(keys: &str, entries: &[String]) -> Settings {
 }
 
 /// An attribute of the Motion Device Axis Object of the first drive, a REAL.
-fn real(rig: &Rig, id: u16) -> f32 {
+pub(super) fn real(rig: &Rig, id: u16) -> f32 {
     let Some(DevicenetNode::Motion(slave)) = rig.devicenet[0].bus.nodes().next() else {
         panic!("a CIP Motion drive")
     };
     let bytes = slave.application().device().attribute(0, id).expect("the attribute");
     f32::from_le_bytes(bytes.try_into().expect("a REAL"))
+}
+
+/// Takes the first drive off its network, and puts another one in its place, as it comes from its maker.
+pub(super) fn replace_devicenet_drive(rig: &mut Rig) {
+    let now = rig.now();
+    rig.devicenet[0].bus.connect(now, 0, false);
+    rig.run_for(millis(500));
+    let now = rig.now();
+    let mac = MacId::new(5).expect("a MAC ID");
+    let kind = DevicenetKind::Motion { modes: Vec::new(), resolution: 1_048_576 };
+    let mut drive = devicenet_drive::node(mac, DataRate::Rate500, &kind);
+    drive.start(now);
+    *rig.devicenet[0].bus.nodes_mut().next().expect("a drive") = drive;
+    rig.devicenet[0].bus.connect(now, 0, true);
 }
 
 /// Lines of the log about start-up lists.
@@ -467,17 +485,68 @@ fn what_a_devicenet_drive_has_otherwise_is_written_before_it_is_used_and_each_ti
     ];
     assert_eq!(told(&rig), written, "{}", rig.told());
     assert!(rig.engine.axes().iter().all(|axis| axis.south().is_some()), "{}", rig.told());
-    // Lost and taken anew, it has forgotten both, and gets them again.
+    // Lost and taken anew, it has kept both.
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, false);
     rig.run_for(millis(500));
     assert_ne!(rig.engine.axes()[0].state(), DriveState::Inhibited, "{}", rig.told());
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, true);
-    rig.run_until(millis(20_000), "the list again", |rig| told(rig).len() == 6);
-    assert_eq!(told(&rig)[3..], written);
+    rig.run_until(millis(20_000), "the list again", |rig| told(rig).len() == 4);
+    assert_eq!(told(&rig)[3], "axis 1: start-up list: 2 entries hold, 0 of them written");
+    // Another one in its place gets them.
+    replace_devicenet_drive(&mut rig);
+    assert_eq!((real(&rig, 504), real(&rig, 485)), (0.0, 0.0), "as it comes from its maker");
+    rig.run_until(millis(20_000), "the list again", |rig| told(rig).len() == 7);
+    assert_eq!(told(&rig)[4..], written);
     assert_eq!((real(&rig, 504), real(&rig, 485)), (80.5, 1_000.0));
     rig.run_until(millis(5_000), "the drive", |rig| rig.engine.axes()[0].south().is_some());
+}
+
+/// A backup of a drive on DeviceNet is its list: the bytes of the file, with the types of the dictionary in the log. What the gateway
+/// writes from the limits of the axis is left out, and a drive of another type is refused.
+#[test]
+fn a_backup_of_a_devicenet_drive_is_a_list() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("startup_lists");
+    fs::create_dir_all(&folder).expect("a folder");
+    let backup = |name: &str, product: u16| -> PathBuf {
+        let parameter = |id: &str, value: f32| {
+            let data: String = value.to_le_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
+            format!(
+                "\n[[parameter]]\nid = \"{id}\"\nname = \"x\"\nvalue = \"\"\ntype = \"f32\"\ndata = \"{data}\"\n"
+            )
+        };
+        let text = format!(
+            "format = 1\naxis = \"turntable\"\nbus = \"devicenet\"\nsource = \"dictionary\"\n\n[drive]\nvendor = \"1\"\n\
+             device_type = \"37\"\nproduct_code = \"{product}\"\n{}{}{}",
+            parameter("66.1.441", 75.5),
+            // Position Error Tolerance, which the gateway writes; and a value that the drive has already.
+            parameter("66.1.444", 9.0),
+            parameter("66.1.461", 250.0),
+        );
+        let path = folder.join(name);
+        fs::write(&path, text).expect("a file");
+        path
+    };
+    let key = |path: &Path| format!("startup_file = \"{}\"\n", path.display());
+    let path = backup("devicenet.toml", 1);
+    let mut rig = Rig::new(devicenet(&key(&path), &[entry("66.1.462", "120", "")]));
+    assert_eq!([441, 461, 462].map(|id| real(&rig, id)), [50.0, 250.0, 100.0], "as it comes from its maker");
+    rig.until_ready();
+    assert_eq!([441, 461, 462].map(|id| real(&rig, id)), [75.5, 250.0, 120.0], "{}", rig.told());
+    let written = [
+        "axis 1: start-up list: 66.1.441 was 50 and is set to 75.5",
+        "axis 1: start-up list: 66.1.462 was 100 and is set to 120",
+        "axis 1: start-up list: 6 entries hold, 2 of them written",
+    ];
+    assert_eq!(told(&rig), written, "{}", rig.told());
+    assert_eq!(real(&rig, 444), 0.5 * 1_048_576.0, "that of the axis");
+    let path = backup("devicenet-other.toml", 2);
+    let mut rig = Rig::new(devicenet(&key(&path), &[]));
+    rig.run_until(millis(20_000), "the list", |rig| !told(rig).is_empty());
+    let expected = "axis 1: the start-up list of the drive failed: 1.1.3 is 1, expected 2 (on_difference";
+    assert!(told(&rig)[0].starts_with(expected), "{:#?}", told(&rig));
+    assert_eq!(real(&rig, 441), 50.0, "nothing is written to it");
 }
 
 #[test]
@@ -487,10 +556,10 @@ fn a_devicenet_drive_that_is_not_as_its_list_says_is_left_out_and_the_other_goes
             entry(TORQUE, "80.5", "type = \"f32\"\non_difference = \"refuse\""),
             "66.1.504 is 0, expected 80.5 (on_difference = \"refuse\")",
         ),
-        // Control Status can only be read.
+        // Axis State can only be read.
         (
-            entry("0x42.1.40", "99", "type = \"u8\""),
-            "writing 66.1.40 = 99 (it is 1): the drive refuses it with status 0x0e: ",
+            entry("0x42.1.650", "99", "type = \"u8\""),
+            "writing 66.1.650 = 99 (it is 0): the drive refuses it with status 0x0e: ",
         ),
         (entry("0x77.1.3", "1", "type = \"u8\""), "119.1.3: the drive refuses it with status 0x16: "),
     ];

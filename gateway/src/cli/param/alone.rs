@@ -8,12 +8,14 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::drive::{Link, Reply};
 use crate::alone::can::CanLine;
+use crate::alone::devicenet::DevicenetLine;
 use crate::alone::sercos::SercosLine;
 use crate::alone::{Line, Session, Wait};
 use crate::cli::progress::Progress;
 use crate::cli::{CliError, signal};
 use crate::config::{Axis, Config, DriveAt, Link as Wire};
 use crate::engine::build::Host;
+use crate::engine::build::devicenet::explicit_master;
 use crate::engine::build::sercos::master_config;
 use crate::engine::port::EthernetPort;
 use crate::mapping::Mapping;
@@ -113,11 +115,17 @@ fn line(config: &Config, axis: &Axis) -> Result<Box<dyn Line>, CliError> {
             let axes = can.drives.iter().filter(|other| other.node == drive.node).map(|other| other.axis);
             Ok(Box::new(CanLine::new(port, drive.node, axes)))
         }
-        DriveAt::Devicenet { .. } => Err(format!(
-            "expected an axis on SERCOS III or CANopen: the drive of `{}` is on DeviceNet, whose parameters need a gateway that runs",
-            axis.name
-        )
-        .into()),
+        DriveAt::Devicenet { .. } => {
+            let found = config.devicenet_drive(axis);
+            let (network, drive) = found.ok_or("expected [[south.devicenet]] in the configuration")?;
+            let mut watches = Vec::new();
+            let port = can_port(&network.link, network.bit_rate(), &mut watches, None, |tap| {
+                Box::new(InProcessCan::of_devicenet(network, tap).in_host_time(network.cycle_time))
+            });
+            let port = port.map_err(|error| no_port(&error))?;
+            let master = explicit_master(config, network, drive);
+            Ok(Box::new(DevicenetLine::new(master, port, drive.mac, &drive.kind)?))
+        }
     }
 }
 

@@ -29,7 +29,7 @@ pub fn run(arguments: &BackupArguments) -> Result<ExitCode, CliError> {
             Found::Report(report) => backup.parameter.push(Kept::from(*report)),
             Found::Refused(refused) if refused.ends_all() => return Err(refused.text.into()),
             // A list of what drives can have, not of what this one has.
-            Found::Refused(refused) if refused.code == "absent" && list.bus == "canopen" => absent += 1,
+            Found::Refused(refused) if refused.code == "absent" && list.bus != "sercos" => absent += 1,
             Found::Refused(refused) => backup.unread.push(Unread::new(&listed.id, &refused)),
         }
     }

@@ -7,10 +7,11 @@ use crate::parameter::backup::{Backup, Identity, Kept, Unread, questions};
 
 impl From<ParameterReport> for Kept {
     fn from(report: ParameterReport) -> Self {
-        let ParameterReport { id, name, value, data, unit, attribute, minimum, maximum, .. } = report;
+        let ParameterReport { id, name, kind, value, data, unit, attribute, minimum, maximum, .. } = report;
         Self {
             id,
             name: name.unwrap_or_default(),
+            kind: kind.unwrap_or_default(),
             value,
             unit: unit.unwrap_or_default(),
             attribute: attribute.unwrap_or_default(),

@@ -71,7 +71,6 @@ pub fn list(list: &List) -> String {
     let source = match list.source.as_str() {
         "dictionary" => "the dictionary of the gateway; the drive may have others, and lack some".to_owned(),
         "file" => "the device file of the configuration".to_owned(),
-        "overlays" => "the overlays; nothing else is known of this drive".to_owned(),
         idn => format!("{idn} of the drive"),
     };
     let _ = writeln!(text, "\n{} parameters, from {source}", list.parameters.len());

@@ -62,8 +62,9 @@ impl<'t> From<&'t AttributeStartupTable> for Row<'t> {
     }
 }
 
-/// The list of a drive on DeviceNet.
+/// The list of a drive on DeviceNet without its file.
 pub(super) fn devicenet(problems: &mut Problems, table: &DevicenetDriveTable) -> Option<Vec<StartupEntry>> {
+    file(problems, table.startup_file.as_ref());
     let usual = table.on_startup_difference.as_ref();
     list(problems, &table.startup, usual, PATH, |id| matches!(id, Id::Path { .. }))
 }

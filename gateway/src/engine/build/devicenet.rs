@@ -1,7 +1,7 @@
 //! The DeviceNet networks of a configuration.
 
 use profile_cip::device::config::DEVICE_TYPE_CIP_MOTION_DRIVE;
-use profile_cip::devicenet::master::config::{MasterConfig, SlaveConfig};
+use profile_cip::devicenet::master::config::{ExpectedIdentity, MasterConfig, SlaveConfig};
 use profile_cip::wire::motion::codes::ControlMode;
 use profile_generic::mode::OperatingMode;
 use profile_generic::ratio::Ratio;
@@ -19,28 +19,47 @@ use crate::mapping::{CipScaling, DriveProgram, Mapping};
 /// Highest SpeedScale and, with a minus, the lowest one that a ratio has room for.
 const SCALE_MAX: u32 = 30;
 
+/// The master of a network without slaves.
+fn without_slaves(config: &Config, network: &Devicenet) -> MasterConfig {
+    // The box is one node there, whatever its devices are.
+    let identity = config.devices.first().map(|device| &device.identity);
+    let (vendor, serial) = identity.map_or((0, 0), |identity| (identity.vendor_id, identity.serial_number));
+    MasterConfig::new(network.mac, vendor, serial, network.rate, network.cycle_time)
+}
+
+/// Who a drive has to be.
+fn identity(drive: &DevicenetDrive) -> ExpectedIdentity {
+    match drive.kind {
+        // The poll connection of another device could carry anything.
+        DevicenetKind::Motion { .. } => {
+            ExpectedIdentity { device_type: Some(DEVICE_TYPE_CIP_MOTION_DRIVE), ..drive.identity }
+        }
+        DevicenetKind::Speed { .. } => drive.identity,
+    }
+}
+
+/// The master of a network that takes the explicit connection of one drive, and nothing else.
+#[must_use]
+pub fn explicit_master(config: &Config, network: &Devicenet, drive: &DevicenetDrive) -> MasterConfig {
+    let slave = SlaveConfig { identity: identity(drive), ..SlaveConfig::explicit(drive.mac) };
+    MasterConfig { slaves: vec![slave], ..without_slaves(config, network) }
+}
+
 /// What the master of a network is told. Slaves that no axis is on are not taken.
 #[must_use]
 pub fn master(config: &Config, place: usize) -> MasterConfig {
     let network = &config.devicenet[place];
-    // The box is one node there, whatever its devices are.
-    let identity = config.devices.first().map(|device| &device.identity);
-    let (vendor, serial) = identity.map_or((0, 0), |identity| (identity.vendor_id, identity.serial_number));
-    let mut master = MasterConfig::new(network.mac, vendor, serial, network.rate, network.cycle_time);
+    let mut master = without_slaves(config, network);
     for (number, drive) in network.drives.iter().enumerate() {
         if axis_of(config, place, number).is_none() {
             continue;
         }
         let (output, input) = lengths(drive);
         let mut slave = SlaveConfig::polled(drive.mac, output, input, drive.packet_rate_ms);
-        slave.identity = drive.identity;
-        match drive.kind {
-            // The poll connection of another device could carry anything.
-            DevicenetKind::Motion { .. } => slave.identity.device_type = Some(DEVICE_TYPE_CIP_MOTION_DRIVE),
-            DevicenetKind::Speed { assembly, .. } => {
-                let assemblies = assembly.status().map(|status| [assembly.0, status.0]);
-                slave.connections.iter_mut().for_each(|poll| poll.assemblies = assemblies);
-            }
+        slave.identity = identity(drive);
+        if let DevicenetKind::Speed { assembly, .. } = drive.kind {
+            let assemblies = assembly.status().map(|status| [assembly.0, status.0]);
+            slave.connections.iter_mut().for_each(|poll| poll.assemblies = assemblies);
         }
         master.slaves.push(SlaveConfig { missed_max: network.allowed_losses, ..slave });
     }
@@ -77,7 +96,7 @@ pub(super) fn bus(
             let made = plan(network, drive, axis, number, mapping);
             let mut made =
                 made.map_err(|error| BuildError::DevicenetDrive { name: axis.name.clone(), error })?;
-            let list = startup::of_devicenet(&drive.startup, &made.steps);
+            let list = startup::of_devicenet(drive, &made.steps, mapping);
             made.has_list = !list.is_empty();
             lists.push((number, list));
             drives.push(made);

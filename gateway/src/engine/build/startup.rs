@@ -1,8 +1,9 @@
 //! What of the start-up list of a drive is used: not what the gateway sets itself.
 
-use crate::config::{Can, CanDrive};
+use crate::config::{Can, CanDrive, DevicenetDrive, KnownObject};
 use crate::engine::bus::devicenet::setup::SetupStep;
-use crate::mapping::{Attribute, Cia402Axis, DriveFacts, Item, Mapping, SercosAxis, Telegram};
+use crate::mapping::{Attribute, Cia402Axis, Cia402Type, DriveFacts, Item, Mapping, SercosAxis, Telegram};
+use crate::parameter::attributes::attributes;
 use crate::parameter::id::Id;
 use crate::parameter::known::{belongs_to_gateway, is_of, objects};
 use crate::parameter::startup::{StartupEntry, StartupValue};
@@ -94,20 +95,31 @@ pub fn of_can(bus: &Can, drive: &CanDrive, needs: &Cia402Axis, mapping: &Mapping
     }
     let reserved = Reserved::of_can(mapping, needs);
     let (_, known) = objects(bus, drive, mapping);
-    let typed = |entry: &StartupEntry| {
-        let Id::Object(object) = entry.id else { return entry.clone() };
-        let of_object = || known.iter().find(|known| known.object == object)?.data_type;
-        // Of a value of the configuration that says its own bytes, no type is expected.
-        let is_hex = matches!(&entry.value, StartupValue::Text(text) if text.starts_with("hex:"));
-        let found = if is_hex { None } else { of_object() };
-        StartupEntry { data_type: entry.data_type.or(found), ..entry.clone() }
+    let of_object = |id| {
+        let is_this = |known: &&KnownObject| Id::Object(known.object) == id;
+        known.iter().find(is_this)?.data_type
     };
-    drive.startup.iter().filter(|entry| reserved.why(entry.id).is_none()).map(typed).collect()
+    let free = drive.startup.iter().filter(|entry| reserved.why(entry.id).is_none());
+    free.map(|entry| typed(entry, of_object)).collect()
 }
 
-/// The list of a drive on DeviceNet that is set up by these steps.
+/// An entry with the type that is known of its parameter, unless it says its own.
+fn typed(entry: &StartupEntry, known: impl Fn(Id) -> Option<Cia402Type>) -> StartupEntry {
+    // Of a value of the configuration that says its own bytes, no type is expected.
+    let is_hex = matches!(&entry.value, StartupValue::Text(text) if text.starts_with("hex:"));
+    let found = if is_hex { None } else { known(entry.id) };
+    StartupEntry { data_type: entry.data_type.or(found), ..entry.clone() }
+}
+
+/// The list of a drive on DeviceNet that is set up by these steps, with the types of its attributes where they are known.
 #[must_use]
-pub fn of_devicenet(startup: &[StartupEntry], steps: &[SetupStep]) -> Vec<StartupEntry> {
+pub fn of_devicenet(drive: &DevicenetDrive, steps: &[SetupStep], mapping: &Mapping) -> Vec<StartupEntry> {
+    if drive.startup.is_empty() {
+        return Vec::new();
+    }
     let reserved = Reserved::of_devicenet(steps);
-    startup.iter().filter(|entry| reserved.why(entry.id).is_none()).cloned().collect()
+    let known = attributes(&drive.kind, mapping);
+    let of_attribute = |id| known.iter().find(|known| known.id == id)?.data_type();
+    let free = drive.startup.iter().filter(|entry| reserved.why(entry.id).is_none());
+    free.map(|entry| typed(entry, of_attribute)).collect()
 }

@@ -265,7 +265,7 @@ impl CommandJob {
         self.asked = Asked::Signature;
         self.report.name = match context.bus {
             Bus::Can { .. } => context.bus.object(object).map(|known| known.name.clone()),
-            Bus::Sercos | Bus::Devicenet => None,
+            Bus::Sercos | Bus::Devicenet { .. } => None,
         }
         .filter(|name| !name.is_empty());
         let rescales = recommissions(self.id);

@@ -6,7 +6,7 @@
 //! | write | the value as it is, the new value, the value again; the unit of an IDN |
 //! | list | of a SERCOS drive its list of IDNs; of others none |
 
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 
 use profile_sercos::wire::attribute::Attribute;
 use profile_sercos::wire::idn::Idn;
@@ -16,6 +16,7 @@ use super::job::{Ask, Context, Listing, ParameterReport, Step, error, is_over, r
 use crate::config::KnownObject;
 use crate::engine::direct::{DirectAnswer, DirectFailure, Direction, Target};
 use crate::local::protocol::parameter_lines;
+use crate::parameter::attributes::KnownAttribute;
 use crate::parameter::command;
 use crate::parameter::id::Id;
 use crate::parameter::known::{Bus, belongs_to_gateway, rescales};
@@ -176,7 +177,14 @@ impl ParameterJob {
                 report.unit = known.and_then(|known| some(&known.unit));
                 report.access = known.and_then(|known| known.access).map(|access| access.name().to_owned());
             }
-            Some(Id::Path { .. }) | None => {}
+            Some(id @ Id::Path { .. }) => {
+                let Some(known) = context.bus.attribute(id) else { return };
+                report.name = Some(known.name.clone());
+                report.unit = Some(known.unit.clone()).filter(|unit| !unit.is_empty());
+                report.access = Some(known.access.name().to_owned());
+                [report.minimum, report.maximum] = known.limits.map(|limit| Some(limit?.to_string()));
+            }
+            None => {}
         }
     }
 
@@ -197,6 +205,9 @@ impl ParameterJob {
                 .object(object)
                 .and_then(|known| known.data_type)
                 .map_or(Kind::Unknown, Kind::Object),
+            (None, Some(id @ Id::Path { .. })) => {
+                context.bus.attribute(id).map_or(Kind::Unknown, |known| known.kind)
+            }
             _ => Kind::Unknown,
         }
     }
@@ -291,33 +302,63 @@ fn list_of_drive(idns: impl Iterator<Item = Idn>, of: Listing, context: &Context
 fn list_without_drive(of: Listing, context: &Context<'_>) -> String {
     let mut text = named(of, context);
     let mut count = text.lines().count();
-    let Bus::Can { source, objects } = context.bus else {
-        let _ = writeln!(text, "{}", end_of_list(count, "overlays", context));
-        return text;
+    let (source, rows) = match context.bus {
+        Bus::Can { source, objects } => (*source, objects_of(of, objects)),
+        Bus::Devicenet { attributes } => ("dictionary", attributes_of(of, attributes)),
+        // It has lists of its own.
+        Bus::Sercos => ("", Vec::new()),
     };
+    for row in rows {
+        count += 1;
+        text += &row;
+    }
+    let _ = writeln!(text, "{}", end_of_list(count, source, context));
+    text
+}
+
+/// The lines of a CANopen drive.
+fn objects_of(of: Listing, objects: &[KnownObject]) -> Vec<String> {
     let is_listed = |known: &&KnownObject| match of {
         Listing::All => true,
         Listing::Backup => known.is_kept(),
         Listing::Commands => command::signature(known.object).is_some(),
     };
-    for known in objects.iter().filter(is_listed) {
-        count += 1;
-        let _ = write!(text, "parameter {}", known.object);
-        let access = known.access.map(|access| ("access", access.name()));
-        let kind = known.data_type.map(|kind| ("type", kind.name()));
-        let unit =
-            Some(("unit", known.unit.as_str())).filter(|(_, unit)| !unit.is_empty() && !unit.contains(' '));
-        for (key, value) in [access, kind, unit].into_iter().flatten() {
+    let line = |known: &KnownObject| {
+        let access = known.access.map_or("", |access| access.name());
+        let kind = known.data_type.map_or("", |kind| kind.name());
+        line(&known.object, [access, kind, &known.unit], &known.name)
+    };
+    objects.iter().filter(is_listed).map(line).collect()
+}
+
+/// The lines of a drive on DeviceNet, which has no procedure commands.
+fn attributes_of(of: Listing, attributes: &[KnownAttribute]) -> Vec<String> {
+    let is_listed = |known: &&KnownAttribute| match of {
+        Listing::All => true,
+        Listing::Backup => known.is_kept,
+        Listing::Commands => false,
+    };
+    let line = |known: &KnownAttribute| {
+        line(&known.id, [known.access.name(), &known.kind.describe(), &known.unit], &known.name)
+    };
+    attributes.iter().filter(is_listed).map(line).collect()
+}
+
+/// The line of a parameter: access, type and unit, as far as they are known, and its name.
+fn line(id: &dyn fmt::Display, details: [&str; 3], name: &str) -> String {
+    let mut text = format!("parameter {id}");
+    for (key, value) in ["access", "type", "unit"].into_iter().zip(details) {
+        // A value is one word.
+        if !value.is_empty() && !value.contains(' ') {
             let _ = write!(text, " {key}={value}");
         }
-        // A name is from a file: it ends with the line whatever is in it.
-        let name: String = known.name.chars().filter(|letter| !letter.is_control()).collect();
-        let _ = match name.is_empty() {
-            true => writeln!(text),
-            false => writeln!(text, " name={name}"),
-        };
     }
-    let _ = writeln!(text, "{}", end_of_list(count, source, context));
+    // A name is from a file: it ends with the line whatever is in it.
+    let name: String = name.chars().filter(|letter| !letter.is_control()).collect();
+    let _ = match name.is_empty() {
+        true => writeln!(text),
+        false => writeln!(text, " name={name}"),
+    };
     text
 }
 

@@ -137,7 +137,7 @@ pub struct SlaveConfig {
     pub mac: MacId,
     /// Who it has to be.
     pub identity: ExpectedIdentity,
-    /// Its I/O connections, at most one of each kind.
+    /// Its I/O connections, at most one of each kind. Without any, it only answers requests.
     pub connections: ArrayVec<IoConfig, CONNECTIONS_MAX>,
     /// So many answers in a row may be missing before the slave counts as lost.
     pub missed_max: u8,
@@ -157,6 +157,13 @@ impl SlaveConfig {
             missed_max: 2,
             hold_cycles: 0,
         }
+    }
+
+    /// A slave of which the explicit connection alone is allocated.
+    #[must_use]
+    pub fn explicit(mac: MacId) -> Self {
+        let identity = ExpectedIdentity::default();
+        Self { mac, identity, connections: ArrayVec::new(), missed_max: 0, hold_cycles: 0 }
     }
 
     /// What is allocated of it.
@@ -211,9 +218,6 @@ pub enum ConfigError {
     /// Two nodes have this MAC ID.
     #[error("MAC ID {0} is given twice")]
     DoubleMac(MacId),
-    /// A slave without I/O connection.
-    #[error("slave {0}: expected at least one I/O connection")]
-    NoConnection(MacId),
     /// A connection that is none of the I/O connections.
     #[error("slave {0}: the explicit connection needs no configuration")]
     Explicit(MacId),
@@ -342,9 +346,6 @@ impl MasterConfig {
 
     fn check_slave(&self, slave: &SlaveConfig) -> Result<(), ConfigError> {
         let mac = slave.mac;
-        if slave.connections.is_empty() {
-            return Err(ConfigError::NoConnection(mac));
-        }
         for (place, one) in slave.connections.iter().enumerate() {
             let kind = one.kind;
             let (output, input) = match kind {

@@ -6,6 +6,7 @@ use super::super::connection::{Change, Connection, ConnectionKind, ConnectionSet
 use super::super::fragmentation::{Body, IoData};
 use super::super::wire::explicit::NO_ADDITIONAL_CODE;
 use super::super::wire::{MacId, Request};
+use crate::device::event::ResetKind;
 use crate::device::objects::identity::Health;
 use crate::wire::status::GeneralStatus;
 
@@ -80,6 +81,6 @@ pub trait Application {
     /// Whether the device may be started anew now, by the Reset service of the Identity object.
     fn permits_reset(&mut self, now: MonotonicTime) -> bool;
 
-    /// The device starts anew.
-    fn reset(&mut self);
+    /// The device starts anew, with what it keeps or with the values of its maker.
+    fn reset(&mut self, kind: ResetKind);
 }

@@ -260,7 +260,7 @@ impl<A: Application> Slave<A> {
             if !self.application.permits_reset(now) {
                 return Err(GeneralStatus::DEVICE_STATE_CONFLICT.into());
             }
-            self.application.reset();
+            self.application.reset(kind);
             self.restart = true;
             self.tell(SlaveEvent::Reset(kind));
             return Ok(());

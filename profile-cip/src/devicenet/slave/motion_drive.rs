@@ -13,6 +13,9 @@
 //! | released, deleted | closes: the axis is without torque and initializes |
 //! | a message without data | none: updates that are missing count as missing |
 //!
+//! The device forgets its attributes when a connection is opened or closed (5-2.3, note 3). This drive has them in a memory that outlives
+//! that, and a Reset of type 0: only one of type 1 brings back the values of its maker.
+//!
 //! Units (IEC 61800-7-202, Table 35): the position control unit is the encoder count, velocity and acceleration are in
 //! revolutions per second and per second squared, torque is % of the rated one.
 
@@ -34,13 +37,14 @@ use super::super::wire::{MacId, Request};
 use super::application::{Application, ServiceError};
 use super::explicit::{append, path_of};
 use crate::device::AxisConfig;
-use crate::device::attribute::AttributeDefinition;
+use crate::device::attribute::{Access, AttributeDefinition};
 use crate::device::axis::drive_link::{
     AxisCommandImage, Command, DriveAction, DriveCondition, DriveConditions, DriveImage, ExceptionAction,
     SetPoints,
 };
 use crate::device::axis::state::{AxisState, ControlKind};
 use crate::device::config::MOTION_SIZE_FIXED;
+use crate::device::event::ResetKind;
 use crate::device::motion::device::{DeviceConfig, DeviceError, MotionDevice};
 use crate::device::motion_link::{
     CloseParameters, ConnectionTriad, EXPLICIT_DATA_MAX, ExplicitRequest, MotionReply, MotionRequest,
@@ -80,7 +84,8 @@ const NANO: i128 = 1_000_000_000;
 /// What the drive is made of.
 #[derive(Debug, Clone)]
 pub struct MotionDriveConfig {
-    /// Attributes of the Motion Device Axis Object beside those of the engine; all of them are kept in the device.
+    /// Attributes of the Motion Device Axis Object beside those of the engine; all of them are kept in the device. Those that a service
+    /// sets outlive connections and resets.
     pub attributes: Vec<AttributeDefinition>,
     /// Axis Fault (attribute 657) of the servo's faults: bit number. What is not here is Axis Fault - Mfg 1.
     pub faults: Vec<(FaultCause, u8)>,
@@ -374,13 +379,29 @@ impl MotionDrive {
             format_revision: FORMAT_REVISION,
             assembly: None,
         };
-        let reply = self.request(now, MotionRequest::Open(parameters));
+        let reply = self.keeping(|drive| drive.request(now, MotionRequest::Open(parameters)));
         debug_assert!(matches!(reply, Some(MotionReply::Opened { outcome: Ok(()), .. })), "{reply:?}");
     }
 
     fn close(&mut self, now: MonotonicTime) {
         let token = self.token();
-        self.request(now, MotionRequest::Close(CloseParameters { token, triad: TRIAD, o_to_t_id: 1 }));
+        let close = CloseParameters { token, triad: TRIAD, o_to_t_id: 1 };
+        self.keeping(|drive| drive.request(now, MotionRequest::Close(close)));
+    }
+
+    /// Does what makes the device forget its attributes, and gives it back those that a service sets.
+    fn keeping<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+        let settable = self.config.attributes.iter().filter(|one| one.access == Access::Set);
+        let ids: Vec<u16> = settable.map(|one| one.id).collect();
+        let value = |id: &u16| self.device.attribute(0, *id).map(<[u8]>::to_vec).unwrap_or_default();
+        let values: Vec<Vec<u8>> = ids.iter().map(value).collect();
+        let result = act(self);
+        for (id, value) in ids.into_iter().zip(values) {
+            // What was read of the same attribute fits it.
+            let put = self.device.put_attribute(0, id, &value);
+            debug_assert_eq!(put, Ok(()), "{id}");
+        }
+        result
     }
 }
 
@@ -528,10 +549,16 @@ impl Application for MotionDrive {
         matches!(reply, Some(MotionReply::ResetPrepared { granted: true, .. }))
     }
 
-    fn reset(&mut self) {
-        // It has been built from this configuration before.
-        if let Ok(device) = device(&self.config) {
-            self.device = device;
+    fn reset(&mut self, kind: ResetKind) {
+        let again = |drive: &mut Self| {
+            // It has been built from this configuration before.
+            if let Ok(device) = device(&drive.config) {
+                drive.device = device;
+            }
+        };
+        match kind {
+            ResetKind::PowerCycle => self.keeping(again),
+            ResetKind::FactoryDefaults => again(self),
         }
         self.image = DriveImage::default();
         self.established = None;

@@ -5,6 +5,7 @@ use profile_generic::time::MonotonicTime;
 
 use super::bench::Bench;
 use super::rig::{MASTER, Net, Node, mac, refusals, slave_config};
+use crate::device::event::ResetKind;
 use crate::device::objects::identity::Health;
 use crate::devicenet::connection::{Change, Connection, ConnectionKind, ConnectionSetup, ConnectionState};
 use crate::devicenet::fragmentation::{Body, IoData};
@@ -87,7 +88,7 @@ impl Application for Terminal {
         true
     }
 
-    fn reset(&mut self) {}
+    fn reset(&mut self, _: ResetKind) {}
 }
 
 fn bench(choice: u8) -> Bench<Terminal> {

@@ -98,9 +98,7 @@ fn configurations_that_cannot_be() {
     for (slaves, text) in refused {
         assert_eq!(with(slaves), Err(text.to_owned()));
     }
-    let mut none = Planned::polled(mac(9), 4, 4, 10);
-    none.connections.clear();
-    assert_eq!(with(vec![none]), Err("slave 9: expected at least one I/O connection".to_owned()));
+    assert_eq!(with(vec![Planned::explicit(mac(9))]), Ok(()));
     let mut twice = Planned::polled(mac(9), 4, 4, 10);
     twice.connections.push(poll(4, 4, 10));
     assert_eq!(with(vec![twice]), Err("slave 9: two of the kind poll connection".to_owned()));
@@ -445,6 +443,29 @@ fn an_explicit_answer_that_is_lost_is_asked_for_once_more_and_then_given_up() {
     );
     assert_eq!(net.master().phase(mac(9)), Some(Phase::Exchange), "the I/O has not noticed");
     undisturbed(&mut net);
+}
+
+/// Without I/O connections a slave is asked, and nothing of it is polled. It stays allocated while nobody asks, and is given back.
+#[test]
+fn a_slave_without_io_connections_is_asked_and_given_back() {
+    let slave = Node::Motion(Slave::new(slave_config(9), motion_drive()));
+    let mut net = Net::with(vec![(Planned::explicit(mac(9)), slave)]);
+    net.trace = Some(Vec::new());
+    net.run_for(15_000);
+    assert_eq!(net.master().phase(mac(9)), Some(Phase::Exchange), "{}", net.text());
+    let explicit = net.motion(1).connection(ConnectionKind::Explicit).state();
+    assert_eq!(explicit, ConnectionState::ESTABLISHED);
+    assert_eq!(net.motion(1).connection(POLL).state(), ConnectionState::NON_EXISTENT);
+    let ticket = net.master().submit(mac(9), ExplicitRequest::get(1, 1, 1)).unwrap();
+    net.run_for(100);
+    let vendor = Outcome::Done([0x23, 0x01].into_iter().collect());
+    assert!(net.events.contains(&Event::Explicit { ticket, outcome: vendor }), "{}", net.text());
+    let now = net.now;
+    net.master().stop(now);
+    net.run_for(100);
+    assert_eq!(net.motion(1).master(), None, "{}", net.text());
+    let poll = Identifier::PollCommand(mac(9)).can();
+    assert!(net.trace.unwrap().iter().all(|(_, frame)| frame.id() != poll));
 }
 
 #[test]

@@ -2,11 +2,18 @@
 
 use core::cell::RefCell;
 
-use super::rig::{Net, mac, motion};
+use profile_generic::servo::ServoParameters;
+
+use super::rig::{Net, Node, mac, motion, slave_config};
+use crate::device::attribute::{Access, AttributeDefinition, DataType, DefaultValue, Scope};
 use crate::device::axis::state::AxisState;
+use crate::device::event::ResetKind;
 use crate::devicenet::connection::ConnectionKind;
 use crate::devicenet::master::event::{Event, ExplicitRequest, Outcome};
 use crate::devicenet::master::motion::{MotionEnd, SetPoint, UpdateError, Watched};
+use crate::devicenet::slave::Slave;
+use crate::devicenet::slave::application::Application as _;
+use crate::devicenet::slave::motion_drive::{MotionDrive, MotionDriveConfig};
 use crate::wire::motion::codes::{AxisControl, AxisStateCode};
 
 const POLL: ConnectionKind = ConnectionKind::Poll;
@@ -158,6 +165,48 @@ fn attributes_travel_in_fragments() {
     assert_eq!(data[7..12], [89, 0, 0, 0, 1], "configuration complete");
     assert_eq!(data[12..17], [0x8A, 2, 0, 0, 2], "Stopped");
     assert_eq!(data[17..19], [0x0F, 0x27]);
+}
+
+/// The drive's memory: a gain that a service has set is there after the connection was closed, opened, lost, and after a Reset of type 0.
+#[test]
+fn what_a_service_sets_outlives_connections_and_a_reset_of_type_0() {
+    let gain = AttributeDefinition {
+        default: DefaultValue::Real(50.0),
+        ..AttributeDefinition::new(Scope::Instance, 441, DataType::Real, Access::Set, "Kpp")
+    };
+    // A value that nobody sets is not remembered.
+    let load = AttributeDefinition::new(Scope::Instance, 635, DataType::Real, Access::Get, "Motor Capacity");
+    let config = MotionDriveConfig {
+        attributes: vec![gain, load],
+        faults: Vec::new(),
+        servo: ServoParameters::default(),
+    };
+    let slave = Slave::new(slave_config(5), MotionDrive::new(config).unwrap());
+    let mut net = Net::with(vec![(motion(5).0, Node::Motion(slave))]);
+    net.exchange();
+    let controllers = [RefCell::new(Controller::new(5, SetPoint::Position(0), Watched::Position))];
+    run(&mut net, &controllers, 100);
+    let value = |net: &mut Net, id| {
+        let device = net.motion(1).application().device();
+        f32::from_le_bytes(device.attribute(0, id).unwrap().try_into().unwrap())
+    };
+    assert_eq!(value(&mut net, 441), 50.0, "as it comes from its maker");
+    let set = [&[1, 0, 0xB9, 1][..], &75.5_f32.to_le_bytes()].concat();
+    let request =
+        ExplicitRequest::new(crate::wire::status::Service::SET_ATTRIBUTE_LIST, 0x42, 1, &set).unwrap();
+    net.master().submit(mac(5), request).unwrap();
+    net.motion(1).application_mut().device_mut().put_attribute(0, 635, &9.0_f32.to_le_bytes()).unwrap();
+    run(&mut net, &controllers, 100);
+    assert_eq!((value(&mut net, 441), value(&mut net, 635)), (75.5, 9.0));
+    let now = net.now;
+    net.master().stop(now);
+    net.run_for(100);
+    assert!(net.motion(1).application().device().connection().is_none(), "{}", net.text());
+    assert_eq!((value(&mut net, 441), value(&mut net, 635)), (75.5, 0.0), "closed");
+    net.motion(1).application_mut().reset(ResetKind::PowerCycle);
+    assert_eq!(value(&mut net, 441), 75.5, "a Reset of type 0");
+    net.motion(1).application_mut().reset(ResetKind::FactoryDefaults);
+    assert_eq!(value(&mut net, 441), 50.0, "and of type 1");
 }
 
 #[test]

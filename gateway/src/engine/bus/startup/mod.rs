@@ -8,7 +8,7 @@
 //! | verify | if anything was written, everything is read once more: one parameter may change another |
 //!
 //! A SERCOS drive goes through the list in CP2 and in CP3. What its attribute protects in CP2 is left for CP3. A CANopen device goes
-//! through it once, in Pre-Operational.
+//! through it once, in Pre-Operational; a drive on DeviceNet once it is polled, before it is set up.
 
 mod report;
 
@@ -423,7 +423,7 @@ impl Item {
         let is_text = match self.kind() {
             Kind::Sercos(attribute) => attribute.format() == Format::Text,
             Kind::Object(kind) => kind == Cia402Type::VisibleString,
-            Kind::Unknown => false,
+            Kind::Array(..) | Kind::ShortString | Kind::Unknown => false,
         };
         let bare = |bytes: &[u8]| bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
         let [wanted, found] = [&self.wanted, &self.found];

@@ -35,6 +35,7 @@ use super::super::wire::speed::{
 use super::super::wire::{MacId, Request};
 use super::application::{Application, ServiceError};
 use super::explicit::serve;
+use crate::device::event::ResetKind;
 use crate::device::objects::identity::{Health, ModuleState};
 use crate::wire::status::GeneralStatus;
 
@@ -481,7 +482,8 @@ impl Application for SpeedDrive {
         self.check_idle().is_ok()
     }
 
-    fn reset(&mut self) {
+    /// Nothing outlives a reset.
+    fn reset(&mut self, _: ResetKind) {
         self.settings = Settings::default();
         self.command = SpeedCommand::default();
         self.network_fault = false;
