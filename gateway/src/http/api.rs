@@ -3,6 +3,7 @@
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
+use super::downloads::{self, ContactList};
 use super::view::{FaultList, HTTP_FAULTS_MAX, HTTP_LINES_MAX, LogLines, Look};
 use crate::config::LogLevel;
 use crate::history::LogQuery;
@@ -21,6 +22,7 @@ pub fn openapi() -> Value {
     let look = generator.subschema_for::<Look>();
     let faults = generator.subschema_for::<FaultList>();
     let lines = generator.subschema_for::<LogLines>();
+    let contacts = generator.subschema_for::<ContactList>();
     let schemas = generator.take_definitions(false);
     let json = |schema: &schemars::Schema| json!({ "application/json": { "schema": schema } });
     let text = |kind: &str| json!({ kind: { "schema": { "type": "string" } } });
@@ -69,7 +71,7 @@ pub fn openapi() -> Value {
         of_axis("Only lines about this axis"),
     ]);
     let status = "The same object as that of `axisbridge status --json`";
-    json!({
+    let mut description = json!({
         "openapi": "3.1.0",
         "info": {
             "title": "Axisbridge",
@@ -98,7 +100,11 @@ pub fn openapi() -> Value {
             ),
         },
         "components": { "schemas": schemas },
-    })
+    });
+    for (path, described) in downloads::describe(&json!(contacts)) {
+        description["paths"][path] = described;
+    }
+    description
 }
 
 #[cfg(test)]

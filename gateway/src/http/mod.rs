@@ -3,6 +3,7 @@
 //! ```text
 //! cycle thread --status--> View --Look--> /healthz /readyz /metrics /api/v1/status
 //!    histories ------------/   \--------> /api/v1/faults /api/v1/log
+//!    recording, contacts ---------------> /recording.pcapng /api/v1/contacts /contact.pcapng /bundle
 //!                            \--twice a second--> /events --> page in a browser
 //! ```
 //!
@@ -10,6 +11,7 @@
 //! publishes anyway: requests, viewers and floods cost the cycle nothing. No request changes anything.
 
 mod api;
+mod downloads;
 mod events;
 mod health;
 mod limits;
@@ -22,6 +24,7 @@ mod tests;
 mod view;
 
 pub use api::openapi;
+pub use downloads::ContactList;
 pub use health::Health;
 pub use metrics::metrics;
 pub use server::{HttpServer, RunningServer};

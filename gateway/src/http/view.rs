@@ -1,12 +1,13 @@
 //! What the server sees of the gateway: the published status, system time, and the names.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Instant, SystemTime};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::health::Health;
+use crate::bundle::Sources;
 use crate::history::{FaultRecord, Histories, LogEvent, LogQuery, Selection};
 use crate::latest::Reader;
 use crate::local::installation::Installation;
@@ -29,6 +30,8 @@ pub struct View {
     time: TimeView,
     histories: Histories,
     started: SystemTime,
+    /// What downloads are made of; `None` without any.
+    sources: Option<Arc<Sources>>,
     /// Of the published status. Only the server's thread takes the lock.
     heartbeat: Mutex<Heartbeat>,
 }
@@ -82,7 +85,18 @@ impl View {
         started: SystemTime,
     ) -> Self {
         let heartbeat = Mutex::new(Heartbeat::new(Instant::now()));
-        Self { installation, status, time, histories, started, heartbeat }
+        Self { installation, status, time, histories, started, sources: None, heartbeat }
+    }
+
+    /// The same, with recordings, contacts and bundles for download.
+    #[must_use]
+    pub fn with_sources(self, sources: Arc<Sources>) -> Self {
+        Self { sources: Some(sources), ..self }
+    }
+
+    /// What downloads are made of.
+    pub(super) const fn sources(&self) -> Option<&Arc<Sources>> {
+        self.sources.as_ref()
     }
 
     /// When the gateway has started.

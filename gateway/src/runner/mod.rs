@@ -28,6 +28,7 @@ use profile_cip::device::identity::{Health, ModuleState};
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
 use tracing::{info, warn};
 
 use self::can_watch::CanWatch;
@@ -36,9 +37,10 @@ use self::indicators::{Change, Shown};
 use self::port::{CanSocketPort, OpenPort, PacketPort, PortError, UdpPort};
 use self::scribe::Scribe;
 use self::strangers::DropWatch;
+use crate::bundle::{Files, Sources};
 use crate::capture::can_bus::CanProtocol;
-use crate::capture::recorder::{Recorder, Settings, Tap};
-use crate::config::{AxisKind, CanLink, Config, Http, Link, ModbusParameter};
+use crate::capture::recorder::{Interfaces, Recorder, Settings, Tap};
+use crate::config::{AxisKind, CanLink, Config, Device, Http, Link, ModbusParameter, RollingRecording};
 use crate::engine::Engine;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
@@ -58,6 +60,7 @@ use crate::mapping::Mapping;
 use crate::modbus::{Binding, ModbusServer, Parameters};
 use crate::north::{self, ExplicitServer, ServeError};
 use crate::parameter::known::Catalogue;
+use crate::recording::{self, ContactDevice, Plan, Recording};
 use crate::settings::Store;
 use crate::simulate::can_bus::InProcessCan;
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
@@ -77,6 +80,9 @@ const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
 
 /// After how many milliseconds a CAN controller that is off the bus starts again by itself.
 const CAN_RESTART_MS: u32 = 100;
+
+/// Records that each tap of a recording to a file can hold: a disk can be slow for a second.
+const CAPTURE_DEPTH: usize = 4_096;
 
 /// Frames that the transmit queue of a CAN interface holds: the RPDOs of a cycle, and more. Linux gives ten.
 const CAN_QUEUE: u32 = 128;
@@ -182,6 +188,8 @@ pub struct RunningBox {
     http: Option<RunningServer>,
     /// What has happened.
     histories: Histories,
+    /// The rolling recording.
+    recording: Option<Arc<Recording>>,
     /// The socket of local control, removed at the end.
     _socket: Option<SocketFile>,
 }
@@ -204,6 +212,8 @@ pub struct Extras<'a> {
     pub local: Option<&'a Path>,
     /// What has happened so far; without it the histories begin here, and the log is not among them.
     pub histories: Option<&'a Histories>,
+    /// The files of the configuration, for the diagnostics bundle.
+    pub files: Option<&'a Files>,
 }
 
 /// Starts a box with these tables; `settings` has what controllers set.
@@ -221,9 +231,10 @@ pub fn start(
         Some(Link::InProcess { .. }) | None => None,
     };
     let mac = wire.as_ref().map_or(SIMULATED_MAC, PacketPort::mac);
+    let recording = rolling(config, &mapping);
     let Built { mut engine, mut adapters, notices, status, commissioners } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
-    let (recorder, mut taps) = record(config, extras.capture)?;
+    let (recorder, mut taps) = record(config, extras.capture, recording.as_ref())?;
     let mut tap = || taps.pop();
     let mut south = Vec::with_capacity(engine.buses().len());
     if let Some(sercos) = &config.sercos {
@@ -289,6 +300,7 @@ pub fn start(
             .map_err(|error| StartError::Adapter { name: device.name.clone(), error })?;
         adapter.hide_connection_ids(secret());
         let (source, asked) = (status.clone(), Arc::clone(&restart));
+        let observer = recording.clone();
         let (kept, keeper, name) = (Arc::clone(settings), Arc::clone(settings), device.name.clone());
         let (clock, clock_source, setter) = (time.view(), config.time.source, time.setter());
         let address = SocketAddrV4::new(device.listen, PORT_IO);
@@ -322,6 +334,9 @@ pub fn start(
                 }
             })
             .on_event(move |event| {
+                if let Some(recording) = &observer {
+                    recording.note_event(number, event);
+                }
                 if let Err(error) = keeper.note(&name, event) {
                     warn!(device = name, %error, "the settings cannot be written; they last until Axisbridge ends");
                 }
@@ -349,8 +364,16 @@ pub fn start(
             }
         });
     }
-    let http =
-        config.http.map(|http| serve_http(http, config, &status, &time, &histories, &limit)).transpose()?;
+    let sources = Arc::new(Sources {
+        config: config.clone(),
+        files: extras.files.cloned().unwrap_or_default(),
+        installation: Installation::of(config),
+        status: status.clone(),
+        time: time.view(),
+        histories: histories.clone(),
+        recording: recording.clone(),
+    });
+    let http = config.http.map(|http| serve_http(http, &sources, &limit)).transpose()?;
     let socket = extras
         .local
         .map(|path| {
@@ -364,12 +387,14 @@ pub fn start(
                 time: time.view(),
                 histories: histories.clone(),
                 limit: Arc::clone(&limit),
+                sources: Arc::clone(&sources),
             };
             serve_local(path, shared, &mut engine, &runtime)
         })
         .transpose()?;
     let stop_notices = Arc::new(AtomicBool::new(false));
-    let scribe = Scribe::new(Installation::of(config), histories.clone(), status.clone(), limit);
+    let scribe = Scribe::new(Installation::of(config), histories.clone(), status.clone(), limit)
+        .with_recording(recording.clone());
     runtime.spawn(scribe.run(notices, Arc::clone(&stop_notices)));
     let devices = config.devices.iter().map(|device| device.name.clone()).collect();
     let axes = config.axes.iter().map(|axis| axis.name.clone()).collect();
@@ -394,6 +419,7 @@ pub fn start(
         time,
         http,
         histories,
+        recording,
         _socket: socket,
     })
 }
@@ -401,18 +427,22 @@ pub fn start(
 /// Lets the HTTP server show the state.
 fn serve_http(
     http: Http,
-    config: &Config,
-    status: &Reader<BoxStatus>,
-    time: &TimeService,
-    histories: &Histories,
+    sources: &Arc<Sources>,
     limit: &Arc<LineLimit>,
 ) -> Result<RunningServer, StartError> {
     let failed = |source| StartError::Http { address: http.listen, source };
     let server = HttpServer::bind(http.listen, http.connections_max).map_err(failed)?;
     let server = server.limit_lines(Arc::clone(limit));
     let address = server.local_address().map_err(failed)?;
-    let (names, histories) = (Installation::of(config), histories.clone());
-    let view = View::new(names, status.clone(), time.view(), histories, WallClock::now());
+    let Sources { installation, status, time, histories, .. } = &**sources;
+    let view = View::new(
+        installation.clone(),
+        status.clone(),
+        time.clone(),
+        histories.clone(),
+        WallClock::now(),
+    )
+    .with_sources(Arc::clone(sources));
     let running =
         server.start(view).map_err(|source| StartError::Thread { what: "the HTTP server", source })?;
     info!(%address, "HTTP");
@@ -524,12 +554,34 @@ fn health(status: &BoxStatus, device: usize) -> Health {
     }
 }
 
-fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, Vec<Tap>), StartError> {
-    let Some(path) = capture else { return Ok((None, Vec::new())) };
-    let mut settings = Settings::new(path);
-    settings.north =
-        config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
-    settings.south = match config.sercos.as_ref().map(|sercos| &sercos.link) {
+/// Starts the recorder thread, where there is something to record, with a tap for each place where traffic is seen.
+fn record(
+    config: &Config,
+    capture: Option<&Path>,
+    recording: Option<&Arc<Recording>>,
+) -> Result<(Option<Recorder>, Vec<Tap>), StartError> {
+    if capture.is_none() && recording.is_none() {
+        return Ok((None, Vec::new()));
+    }
+    let file = capture.map(|path| Settings { interfaces: interfaces(config), ..Settings::new(path) });
+    let depth = if file.is_some() { CAPTURE_DEPTH } else { recording::DEPTH };
+    // The buses, and for each device its I/O and its explicit side.
+    let buses = usize::from(config.sercos.is_some()) + config.can.len() + config.devicenet.len();
+    let taps = buses + 2 * config.devices.len();
+    let (recorder, taps) =
+        Recorder::start_with(file, recording.map(Recording::sink), depth, taps).map_err(|source| {
+            match capture {
+                Some(path) => StartError::Recording { path: path.display().to_string(), source },
+                None => StartError::Thread { what: "the recorder", source },
+            }
+        })?;
+    Ok((Some(recorder), taps))
+}
+
+/// The interfaces of a recording.
+fn interfaces(config: &Config) -> Interfaces {
+    let north = config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
+    let south = match config.sercos.as_ref().map(|sercos| &sercos.link) {
         Some(Link::Interface { name, ring }) => {
             [name.clone(), ring.as_deref().unwrap_or("not used").to_owned()]
         }
@@ -541,13 +593,25 @@ fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, 
     };
     let can = config.can.iter().map(|bus| CanProtocol::Canopen.describe(&bus.link));
     let devicenet = config.devicenet.iter().map(|network| CanProtocol::Devicenet.describe(&network.link));
-    settings.can = can.chain(devicenet).collect();
-    settings.depth = 4096;
-    // The buses, and for each device its I/O and its explicit side.
-    let buses = usize::from(config.sercos.is_some()) + config.can.len() + config.devicenet.len();
-    let (recorder, taps) = Recorder::start(settings, buses + 2 * config.devices.len())
-        .map_err(|source| StartError::Recording { path: path.display().to_string(), source })?;
-    Ok((Some(recorder), taps))
+    Interfaces { north, south, can: can.chain(devicenet).collect() }
+}
+
+/// The rolling recording of a configuration.
+fn rolling(config: &Config, mapping: &Mapping) -> Option<Arc<Recording>> {
+    let RollingRecording { seconds, memory } = config.recording?;
+    let named = |device: &Device| ContactDevice { name: device.name.clone(), address: device.listen };
+    let attributes = mapping.dictionaries.cip.attributes().iter();
+    let attributes = attributes.map(|row| (row.id, row.name.clone())).collect();
+    Some(Recording::new(Plan {
+        span: DurationNs::from_secs(seconds.into()),
+        memory,
+        interfaces: interfaces(config),
+        devices: config.devices.iter().map(named).collect(),
+        axes: config.axes.iter().map(|axis| (axis.name.clone(), axis.device)).collect(),
+        attributes: Arc::new(attributes),
+        buses: Installation::of(config).buses.into_iter().map(|bus| bus.name).collect(),
+        directory: config.history_dir.clone(),
+    }))
 }
 
 /// Differs from start to start.
@@ -656,6 +720,9 @@ impl RunningBox {
         drop(self.http);
         self.runtime.shutdown_timeout(Duration::from_secs(1));
         self.histories.faults.close();
+        if let Some(recording) = self.recording {
+            recording.close();
+        }
         let summary = self.recorder.map(Recorder::finish).transpose()?;
         Ok(Stopped { dropped: summary.map(|summary| summary.dropped), unrested })
     }
