@@ -87,6 +87,9 @@ mod tests {
         let lines: Vec<Vec<&str>> = list.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(lines[0], ["-rw-r--r--", "0/0", "5", "2026-01-31", "12:00", "bundle/a.txt"]);
         assert_eq!((lines[1][2], lines[2][2], lines.len()), ("0", "512", 3));
-        assert_eq!(tar(&["-xOf", "-", "bundle/a.txt", "bundle/block"]), [&b"hello"[..], &[7; BLOCK]].concat());
+        assert_eq!(
+            tar(&["-xOf", "-", "bundle/a.txt", "bundle/block"]),
+            [&b"hello"[..], &[7; BLOCK]].concat()
+        );
     }
 }

@@ -33,11 +33,23 @@ mod tests {
 
     #[test]
     fn sizes_are_read_and_shown() {
-        for (text, bytes) in [("16 MB", 16_000_000), ("2MB", 2_000_000), (" 1 GB ", 1_000_000_000), ("7 kB", 7_000)] {
+        for (text, bytes) in
+            [("16 MB", 16_000_000), ("2MB", 2_000_000), (" 1 GB ", 1_000_000_000), ("7 kB", 7_000)]
+        {
             assert_eq!(parse(text), Some(bytes), "{text}");
             assert_eq!(parse(&show(bytes)), Some(bytes));
         }
-        for text in ["", "16", "MB", "1.5 MB", "-1 MB", "16 MiB", "16 mb", "99999999999999999999 kB", "18446744073709551615 GB"] {
+        for text in [
+            "",
+            "16",
+            "MB",
+            "1.5 MB",
+            "-1 MB",
+            "16 MiB",
+            "16 mb",
+            "99999999999999999999 kB",
+            "18446744073709551615 GB",
+        ] {
             assert_eq!(parse(text), None, "{text}");
         }
     }

@@ -120,11 +120,7 @@ fn update(data: &[u8], show: &mut impl FnMut(Shown)) {
     }
 }
 
-fn state(
-    node: NodeStatus,
-    mut axes: impl Iterator<Item = AxisStateCode>,
-    show: &mut impl FnMut(Shown),
-) {
+fn state(node: NodeStatus, mut axes: impl Iterator<Item = AxisStateCode>, show: &mut impl FnMut(Shown)) {
     if node.contains(NodeStatus::SYNC_MODE) {
         show(Shown::Synchronous);
     }

@@ -110,6 +110,7 @@ pub fn openapi() -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::contact::{Contact, Phase, PhaseReached, RefusedService};
 
     #[test]
     fn answer_has_exactly_the_fields_of_the_schema() {
@@ -122,6 +123,13 @@ mod tests {
         compare(&description, &description["components"]["schemas"]["FaultList"], &faults, "FaultList");
         let lines = serde_json::to_value(view.log(&LogQuery::default())).unwrap();
         compare(&description, &description["components"]["schemas"]["LogLines"], &lines, "LogLines");
+        let contact = Contact {
+            phases: vec![PhaseReached { phase: Phase::GroupSync, after_ms: 1 }],
+            refused: vec![RefusedService::default()],
+            ..Contact::default()
+        };
+        let contacts = serde_json::to_value(ContactList { contacts: vec![contact] }).unwrap();
+        compare(&description, &description["components"]["schemas"]["ContactList"], &contacts, "ContactList");
         let reference = &description["paths"]["/api/v1/status"]["get"]["responses"]["200"]["content"]["application/json"]
             ["schema"]["$ref"];
         assert_eq!(reference, "#/components/schemas/Overview");

@@ -52,9 +52,7 @@ pub(super) fn routes() -> Router<Sources> {
 
 /// The paths in the description of the interface; `contacts` is the schema of [`ContactList`].
 pub(super) fn describe(contacts: &Value) -> Vec<(&'static str, Value)> {
-    let text = |description: &str| {
-        json!({ "description": description, "content": { "text/plain": { "schema": { "type": "string" } } } })
-    };
+    let text = |description: &str| json!({ "description": description, "content": { "text/plain": { "schema": { "type": "string" } } } });
     let file = |summary: &str, kind: &str, parameter: Option<Value>| {
         let content = json!({ kind: { "schema": { "type": "string", "format": "binary" } } });
         let mut path = json!({ "get": { "summary": summary, "responses": {
@@ -97,11 +95,7 @@ pub(super) fn describe(contacts: &Value) -> Vec<(&'static str, Value)> {
     ]
 }
 
-async fn recording(
-    State(sources): State<Sources>,
-    method: Method,
-    RawQuery(query): RawQuery,
-) -> Response {
+async fn recording(State(sources): State<Sources>, method: Method, RawQuery(query): RawQuery) -> Response {
     let last = match recording_query(&mut words(query.as_deref()).into_iter()) {
         Ok(last) => last,
         Err(error) => return refused(&error),
@@ -118,9 +112,8 @@ async fn contact(State(sources): State<Sources>, method: Method, RawQuery(query)
         Ok(number) => number,
         Err(error) => return refused(&error),
     };
-    let make = move |from: &bundle::Sources| {
-        from.recording.as_ref().map(|recording| recording.take_contact(number))
-    };
+    let make =
+        move |from: &bundle::Sources| from.recording.as_ref().map(|recording| recording.take_contact(number));
     download(sources, method, (PCAPNG, "contact.pcapng"), make).await
 }
 

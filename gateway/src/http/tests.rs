@@ -194,7 +194,7 @@ fn every_path_of_the_description_is_answered_and_no_other() {
     let description: Value = serde_json::from_str(&answer.body).unwrap();
     assert_eq!(description, openapi());
     let paths: Vec<&String> = description["paths"].as_object().unwrap().keys().collect();
-    assert_eq!(paths.len(), 11);
+    assert_eq!(paths.len(), 16);
     for path in paths {
         // A stream has no end: its head is enough.
         let answer = bench.ask("HEAD", path);

@@ -693,6 +693,25 @@ mod tests {
         assert_eq!(parse("axes", &axes), Ok(Request::Axes));
         assert_eq!(parse("  status\ty-2 ", &axes), Ok(Request::Status { axis: 1 }));
         assert_eq!(parse("parameters", &axes), Ok(Request::Parameters));
+        assert_eq!(parse("contacts", &axes), Ok(Request::Contacts));
+        for (line, wanted) in [
+            ("record", FileRequest::Recording(None)),
+            ("record last=30", FileRequest::Recording(Some(DurationNs::from_secs(30)))),
+            ("contact number=7", FileRequest::Contact(7)),
+            ("bundle", FileRequest::Bundle),
+        ] {
+            assert_eq!(parse(line, &axes), Ok(Request::File(wanted)));
+            assert!(line.starts_with(wanted.word()));
+        }
+        for (line, said) in [
+            ("record last=0", "unexpected `last=0`: expected last=SECONDS, a whole number from 1"),
+            ("record last=1 x", "unexpected `x`: expected the end of the line"),
+            ("contact", "`contact` needs number=N"),
+            ("contact 7", "unexpected `7`: expected number=N"),
+            ("bundle x", "unexpected `x`: expected the end of the line"),
+        ] {
+            assert_eq!(parse(line, &axes).unwrap_err().to_string(), said);
+        }
         let parameter = |parameter, wanted| Ok(Request::Parameter { axis: 1, parameter, wanted });
         assert_eq!(parse("read y-2 code", &axes), parameter(1, None));
         assert_eq!(parse("write y-2 notch_frequency -5", &axes), parameter(0, Some(-5)));

@@ -799,6 +799,27 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn files_are_sent_with_their_length_between_other_replies() {
+        let bench = Bench::start("files");
+        let mut client = bench.connect().await;
+        say(&mut client, "contacts\nrecord last=5\ncontact number=3\nbundle\naxes\n").await;
+        assert_eq!(hear(&mut client).await, "ok contacts 0\n");
+        let file = async |client: &mut BufReader<UnixStream>, word: &str| {
+            let head = hear(client).await;
+            let length = head.strip_prefix(&format!("ok {word} bytes=")).expect(&head).trim_end();
+            let mut bytes = vec![0; length.parse().unwrap()];
+            client.read_exact(&mut bytes).await.unwrap();
+            bytes
+        };
+        let recording = file(&mut client, "record").await;
+        assert_eq!(recording[..4], [0x0A, 0x0D, 0x0D, 0x0A]);
+        assert_eq!(hear(&mut client).await, "error contact - recording: there is no contact 3\n");
+        let bundle = file(&mut client, "bundle").await;
+        assert!(bundle.starts_with(b"axisbridge-bundle/recording.pcapng\0"));
+        assert!(hear(&mut client).await.starts_with("axis x state="));
+    }
+
+    #[tokio::test]
     async fn histories_are_objects_on_lines_of_their_own() {
         let bench = Bench::start("histories");
         let mut client = bench.connect().await;

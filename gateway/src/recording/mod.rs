@@ -18,6 +18,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
 
 use profile_cip::device::event::Event;
 use profile_generic::time::DurationNs;
@@ -26,7 +27,7 @@ use tracing::{info, warn};
 pub use self::contact::{AttributeNames, Contact, ContactDevice};
 
 use self::automatic::Automatic;
-use self::contact::{Contacts, Happening};
+use self::contact::{Contacts, Happening, Unsaved};
 use self::ring::FrameRing;
 use crate::capture::Side;
 use crate::capture::recorder::{FrameSink, Interfaces};
@@ -39,6 +40,9 @@ const EXPLICIT_PART: usize = 32;
 
 /// Events of the adapters that wait for the recorder thread; more are left out.
 const INBOX_MAX: usize = 1_024;
+
+/// Least time from one writing of the contacts to the next: a controller that is refused again and again wears no disk.
+const SAVE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Records that the queue of each place where traffic is seen can hold: the recorder thread may be late by tens of
 /// milliseconds.
@@ -103,6 +107,15 @@ struct State {
     contacts: Contacts,
     automatic: Automatic,
     lost: u64,
+    contacts_saved: Option<Instant>,
+}
+
+impl State {
+    /// The contacts that have changed; the next ones have time until they are asked for.
+    fn to_save(&mut self) -> Option<Unsaved> {
+        self.contacts_saved = Some(Instant::now());
+        self.contacts.to_save()
+    }
 }
 
 impl Recording {
@@ -124,6 +137,7 @@ impl Recording {
             ),
             automatic: Automatic::new(names, buses, directory.map(|path| path.join("recordings"))),
             lost: 0,
+            contacts_saved: None,
         };
         Arc::new(Self {
             span,
@@ -201,12 +215,23 @@ impl Recording {
     #[must_use]
     pub fn is_unsaved(&self) -> bool {
         let state = self.state();
-        state.automatic.is_due(realtime_now()) || state.contacts.is_unsaved()
+        let rested = state.contacts_saved.is_none_or(|at| at.elapsed() >= SAVE_INTERVAL);
+        state.automatic.is_due(realtime_now()) || (rested && state.contacts.is_unsaved())
     }
 
     /// Writes the recording of a fault that is due, and contacts that have changed. It waits for the disk.
     pub fn save(&self) {
-        let due = self.state().automatic.take_due(realtime_now());
+        self.save_until(realtime_now());
+    }
+
+    /// The gateway ends: what is due later is written now. It waits for the disk.
+    pub fn close(&self) {
+        self.state().contacts.close();
+        self.save_until(KernelTime(u64::MAX));
+    }
+
+    fn save_until(&self, now: KernelTime) {
+        let due = self.state().automatic.take_due(now);
         if let Some((files, incident)) = due {
             // It is not worth leaving out because somebody looks at a recording.
             let _making = lock(&self.making);
@@ -219,14 +244,8 @@ impl Recording {
         self.save_contacts();
     }
 
-    /// The gateway ends. It waits for the disk.
-    pub fn close(&self) {
-        self.state().contacts.close();
-        self.save();
-    }
-
     fn save_contacts(&self) {
-        let Some((files, changed, kept)) = self.state().contacts.to_save() else { return };
+        let Some((files, changed, kept)) = self.state().to_save() else { return };
         if changed.is_empty() {
             return;
         }

@@ -10,10 +10,8 @@ use crate::capture::recorder::Recorder;
 
 /// A recording of two devices and two axes in 2 MB.
 pub(crate) fn recording(directory: Option<PathBuf>) -> Arc<Recording> {
-    let device = |name: &str, last| ContactDevice {
-        name: name.to_owned(),
-        address: Ipv4Addr::new(192, 0, 2, last),
-    };
+    let device =
+        |name: &str, last| ContactDevice { name: name.to_owned(), address: Ipv4Addr::new(192, 0, 2, last) };
     Recording::new(Plan {
         span: DurationNs::from_secs(10),
         memory: 2_000_000,

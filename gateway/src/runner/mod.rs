@@ -435,14 +435,9 @@ fn serve_http(
     let server = server.limit_lines(Arc::clone(limit));
     let address = server.local_address().map_err(failed)?;
     let Sources { installation, status, time, histories, .. } = &**sources;
-    let view = View::new(
-        installation.clone(),
-        status.clone(),
-        time.clone(),
-        histories.clone(),
-        WallClock::now(),
-    )
-    .with_sources(Arc::clone(sources));
+    let view =
+        View::new(installation.clone(), status.clone(), time.clone(), histories.clone(), WallClock::now())
+            .with_sources(Arc::clone(sources));
     let running =
         server.start(view).map_err(|source| StartError::Thread { what: "the HTTP server", source })?;
     info!(%address, "HTTP");

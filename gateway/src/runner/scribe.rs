@@ -82,7 +82,9 @@ impl Scribe {
                 saving = Some(tokio::task::spawn_blocking(move || faults.save()));
             }
             let idle = recording_saves.as_ref().is_none_or(JoinHandle::is_finished);
-            if let Some(recording) = self.recording.as_ref().filter(|recording| idle && recording.is_unsaved()) {
+            if let Some(recording) =
+                self.recording.as_ref().filter(|recording| idle && recording.is_unsaved())
+            {
                 let recording = Arc::clone(recording);
                 recording_saves = Some(tokio::task::spawn_blocking(move || recording.save()));
             }

@@ -109,25 +109,39 @@ fn contact_recording_fault_and_bundle_of_a_running_gateway() {
         let ended = |contact: &Value| contact["kind"] == "motion" && !contact["end"].is_null();
         let contact = until(&gateway, || contacts(&gateway).into_iter().find(ended));
         first.terminate(PATIENCE);
-        let phases: Vec<_> = contact["phases"].as_array().expect("a list").iter().map(|one| &one["phase"]).collect();
+        let phases: Vec<_> =
+            contact["phases"].as_array().expect("a list").iter().map(|one| &one["phase"]).collect();
         assert_eq!(phases[0], "forward_open");
         for phase in ["configuration", "group_sync", "synchronous", "first_enable"] {
             assert!(phases.iter().any(|one| *one == phase), "{contact}");
         }
         assert!(contact["peer"].as_str().is_some_and(|peer| peer.starts_with("127.0.1.94:")), "{contact}");
-        assert!(contact["end"]["by"].as_str().is_some_and(|by| by.contains("closed by its originator")), "{contact}");
+        assert!(
+            contact["end"]["by"].as_str().is_some_and(|by| by.contains("closed by its originator")),
+            "{contact}"
+        );
         assert!(contact["frames"].as_u64().is_some_and(|frames| frames > 100), "{contact}");
-        let other = contacts(&gateway).into_iter().find(|contact| contact["kind"] == "refused").expect("refused");
+        let other =
+            contacts(&gateway).into_iter().find(|contact| contact["kind"] == "refused").expect("refused");
         assert!(other["peer"].as_str().is_some_and(|peer| peer.starts_with("127.0.1.95:")), "{other}");
         assert_eq!(other["refused"][0]["service"], "Forward_Open");
-        assert!(other["refused"][0]["reason"].as_str().is_some_and(|reason| reason.contains("0x01")), "{other}");
+        assert!(
+            other["refused"][0]["reason"].as_str().is_some_and(|reason| reason.contains("0x01")),
+            "{other}"
+        );
 
         // The frames of the contact, and the last seconds of both sides.
         let number = contact["number"].to_string();
         let (frames, last) = (path("recording-contact.pcapng"), path("recording-last.pcapng"));
         written(&gateway, &["contacts", &number, "--pcapng"], &frames);
         let tree = decoded(&frames);
-        for part in ["SYN", "RegisterSession", "Forward_Open request", "Forward_Open reply: 0x00", "CIP Motion D-to-C"] {
+        for part in [
+            "SYN",
+            "RegisterSession",
+            "Forward_Open request",
+            "Forward_Open reply: 0x00",
+            "CIP Motion D-to-C",
+        ] {
             assert!(tree.contains(part), "no {part:?} in {tree:.20000}");
         }
         written(&gateway, &["record", "--last", "10", "--output"], &last);
@@ -141,7 +155,11 @@ fn contact_recording_fault_and_bundle_of_a_running_gateway() {
         if peer::tshark_or_skip(NAME) {
             for (file, filter) in [(&frames, "enip && tcp"), (&frames, "cipm"), (&last, "siii")] {
                 let found = tshark::dissect(file, filter, &[]);
-                assert!(!found.is_empty() && tshark::warnings(file).is_empty(), "{filter}: {:?}", tshark::warnings(file));
+                assert!(
+                    !found.is_empty() && tshark::warnings(file).is_empty(),
+                    "{filter}: {:?}",
+                    tshark::warnings(file)
+                );
             }
         }
 
@@ -159,7 +177,15 @@ fn contact_recording_fault_and_bundle_of_a_running_gateway() {
         let archive = path("recording-bundle.tar");
         written(&gateway, &["bundle", "--output"], &archive);
         let listed = names(&archive);
-        for name in ["status.json", "faults.json", "log.jsonl", "contacts.json", "configuration.toml", "doctor.txt", "recording.pcapng"] {
+        for name in [
+            "status.json",
+            "faults.json",
+            "log.jsonl",
+            "contacts.json",
+            "configuration.toml",
+            "doctor.txt",
+            "recording.pcapng",
+        ] {
             assert!(listed.contains(&format!("axisbridge-bundle/{name}")), "{listed:?}");
         }
         assert!(listed.contains(&format!("axisbridge-bundle/contact-{number}.pcapng")), "{listed:?}");

@@ -77,7 +77,8 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
 
     let settings = Arc::new(Store::open(None)?);
     let start = || {
-        let extras = runner::Extras { capture: Some(&arguments.capture), local: None, histories: None, files: None };
+        let extras =
+            runner::Extras { capture: Some(&arguments.capture), local: None, histories: None, files: None };
         runner::start(&config, mapping.clone(), extras, &settings).map_err(|error| in_use(error, listen))
     };
     let running = match &clocks {

@@ -48,10 +48,7 @@ mod tests {
 
     #[test]
     fn what_is_out_of_range_is_said() {
-        let both = [
-            "the length of the recording is 601",
-            "the memory of the recording is `1999 kB`",
-        ];
+        let both = ["the length of the recording is 601", "the memory of the recording is `1999 kB`"];
         assert_eq!(of("seconds = 601\nmemory = \"1999 kB\""), Err(both.map(str::to_owned).to_vec()));
         assert_eq!(of("memory = \"16\""), Err(vec!["`16` is not a size".to_owned()]));
     }

@@ -33,7 +33,7 @@ pub(in crate::recording) struct Files {
 
 impl Files {
     /// The folder, which is made if it is not there, and the newest contacts in it, oldest first, each with the file of its
-    /// frames. What cannot be read is logged and left alone.
+    /// frames. What cannot be read is logged.
     pub fn open(folder: PathBuf, most: usize) -> (Self, Vec<(Contact, Option<PathBuf>)>) {
         let files = Self { folder };
         let shown = files.folder.display();
@@ -83,7 +83,10 @@ impl Files {
         let described: Described = serde_json::from_str(&text).map_err(|error| error.to_string())?;
         if (described.format, described.contact.number) != (FORMAT, number) {
             let Described { format, contact } = described;
-            return Err(format!("expected format {FORMAT}, number {number}, found {format}, {}", contact.number));
+            return Err(format!(
+                "expected format {FORMAT}, number {number}, found {format}, {}",
+                contact.number
+            ));
         }
         Ok(described.contact)
     }
@@ -91,9 +94,8 @@ impl Files {
     /// The contacts that have a description.
     fn numbers(&self) -> Vec<u64> {
         let Ok(folder) = std::fs::read_dir(&self.folder) else { return Vec::new() };
-        let number = |entry: std::fs::DirEntry| {
-            entry.file_name().to_str()?.strip_suffix(".json")?.parse().ok()
-        };
+        let number =
+            |entry: std::fs::DirEntry| entry.file_name().to_str()?.strip_suffix(".json")?.parse().ok();
         folder.flatten().take(FILES_MAX).filter_map(number).collect()
     }
 

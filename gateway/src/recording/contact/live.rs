@@ -8,8 +8,8 @@ use std::sync::Arc;
 use profile_cip::wire::ConnectionTriad;
 
 use super::super::ring::{append, kept_len};
-use super::record::{Contact, Phase, PhaseReached, RefusedService};
 use super::MILLI;
+use super::record::{Contact, Phase, PhaseReached, RefusedService};
 use crate::capture::Side;
 use crate::decode::dialogue::{Dialogue, Shown, carries_service};
 use crate::decode::packet::Packet;
@@ -54,7 +54,10 @@ pub type AttributeNames = Arc<BTreeMap<u16, String>>;
 
 impl fmt::Debug for Live {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Live").field("triad", &self.triad).field("opened", &self.opened).finish_non_exhaustive()
+        f.debug_struct("Live")
+            .field("triad", &self.triad)
+            .field("opened", &self.opened)
+            .finish_non_exhaustive()
     }
 }
 
@@ -130,7 +133,7 @@ impl Live {
         phases.iter().copied().find(|phase| contact.phases.iter().all(|one| one.phase != *phase))
     }
 
-    /// Takes a frame if it is one of this contact; whether the contact has changed in more than its frames.
+    /// Takes a frame if it is one of this contact; whether its files have to be written again.
     pub fn frame(
         &mut self,
         contact: &mut Contact,
@@ -142,18 +145,20 @@ impl Live {
         if !self.is_of(packet) || at.0.saturating_add(FRAMES_BEFORE) < self.opened.0 {
             return false;
         }
+        let mut appended = false;
         if at <= self.frames_until {
             let cyclic = matches!(packet, Packet::Udp { payload, .. } if !carries_service(payload));
             let room = if cyclic { budget - budget / KEPT_FREE } else { budget };
             if frames.len() + kept_len(frame) <= room {
                 append(frames, at, Side::North, frame);
                 contact.frames += 1;
+                appended = true;
             } else {
                 contact.frames_left_out += 1;
             }
         }
         if self.ended {
-            return false;
+            return appended;
         }
         let Self { dialogue, opened, watched, names, .. } = self;
         let after_ms = at.0.saturating_sub(opened.0) / MILLI;

@@ -81,6 +81,9 @@ struct Kept {
     unsaved: bool,
 }
 
+/// The folder, what has changed with its frames, and the numbers of all that are kept.
+pub(super) type Unsaved = (Files, Vec<(Contact, Vec<u8>)>, Vec<u64>);
+
 /// All contacts.
 #[derive(Debug)]
 pub(super) struct Contacts {
@@ -185,7 +188,7 @@ impl Contacts {
             Notice::Scaling { .. } => "scaling attributes",
             _ => return,
         };
-        for kept in self.opened.iter_mut() {
+        for kept in &mut self.opened {
             let Kept { contact, live: Some(live), .. } = kept else { continue };
             if live.device != device || !live.is_watched() {
                 continue;
@@ -202,7 +205,7 @@ impl Contacts {
     /// Looks at the published status: what is awaited now.
     pub fn look(&mut self, status: &BoxStatus) {
         let axes = &self.axes;
-        for kept in self.opened.iter_mut() {
+        for kept in &mut self.opened {
             let Kept { contact, live: Some(live), .. } = kept else { continue };
             let mut awaited = Vec::new();
             if live.is_watched() {
@@ -239,7 +242,7 @@ impl Contacts {
     }
 
     /// What is to be written, and the numbers of the contacts that are still kept.
-    pub fn to_save(&mut self) -> Option<(Files, Vec<(Contact, Vec<u8>)>, Vec<u64>)> {
+    pub fn to_save(&mut self) -> Option<Unsaved> {
         let files = self.files.clone()?;
         let mut changed = Vec::new();
         for kept in self.opened.iter_mut().chain(&mut self.refused) {
@@ -275,12 +278,18 @@ impl Contacts {
     ) {
         let Happening { device, at, event } = *happening;
         let Some(named) = self.devices.get(device).cloned() else { return };
-        let live = Live::new(device, named.address, host, triad, at, kind == "motion", Arc::clone(&self.names));
+        let live =
+            Live::new(device, named.address, host, triad, at, kind == "motion", Arc::clone(&self.names));
         let mut contact = self.contact(at, &named.name, kind, event.to_string());
         contact.peer = std::net::SocketAddrV4::new(host, port).to_string();
         contact.phases.push(PhaseReached { phase: Phase::ForwardOpen, after_ms: 0 });
         let budget = self.budget;
-        self.begin(false, Kept { contact, host: Some(host), live: Some(Box::new(live)), ..Kept::default() }, budget, explicit);
+        self.begin(
+            false,
+            Kept { contact, host: Some(host), live: Some(Box::new(live)), ..Kept::default() },
+            budget,
+            explicit,
+        );
     }
 
     /// Begins a contact that was refused, or counts it as one more of its kind.
@@ -351,10 +360,11 @@ impl Contacts {
         let host = kept.host;
         contacts.push_back(kept);
         let of_host = contacts.iter().filter(|known| known.host == host).count();
-        if refused && of_host > REFUSALS_OF_PEER_MAX {
-            if let Some(oldest) = contacts.iter().position(|known| known.host == host) {
-                contacts.remove(oldest);
-            }
+        if refused
+            && of_host > REFUSALS_OF_PEER_MAX
+            && let Some(oldest) = contacts.iter().position(|known| known.host == host)
+        {
+            contacts.remove(oldest);
         }
         if contacts.len() > places {
             let place = place_to_free(contacts);
@@ -383,7 +393,8 @@ fn place_to_free(contacts: &VecDeque<Kept>) -> usize {
 /// The reason of a refused Forward_Open in words.
 fn refusal(general: u8, extended: u16, event: &Event) -> String {
     let name = ConnectionStatus(extended).name().map(|name| format!(", {extended:#06x} ({name})"));
-    let mut text = format!("{}{}", GeneralStatus(general), name.unwrap_or_else(|| format!(", {extended:#06x}")));
+    let mut text =
+        format!("{}{}", GeneralStatus(general), name.unwrap_or_else(|| format!(", {extended:#06x}")));
     if let Event::OpenRefused { expected, found, .. } = event {
         match (expected, found) {
             (Some(expected), Some(found)) => {
