@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn fault_is_due_a_second_later_and_others_wait_for_the_pause() {
         let mut automatic = automatic(Some(PathBuf::from("x")));
-        let at = |seconds: u64| KernelTime(1_000 * SECOND + seconds * SECOND);
+        let at = |seconds: u64| KernelTime(100_000 * SECOND + seconds * SECOND);
         let incident = automatic.note(at(0), &fault(1)).unwrap();
         assert_eq!(incident.to_string(), "the fault over_current of axis slide");
         assert!(!automatic.is_due(KernelTime(at(1).0 - 1)) && automatic.take_due(at(0)).is_none());
