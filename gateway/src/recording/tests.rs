@@ -77,6 +77,12 @@ fn frames_come_from_the_taps_and_no_file_is_needed() {
 }
 
 #[test]
+fn queues_of_a_large_gateway_are_shorter() {
+    // A bus with one device, one bus with four, and 64 devices on nine buses.
+    assert_eq!([3, 9, 137].map(depth), [256, 227, 64]);
+}
+
+#[test]
 fn events_that_nobody_takes_are_bounded() {
     let recording = recording(None);
     let triad = ConnectionTriad { connection_serial: 1, originator_vendor: 1, originator_serial: 2 };

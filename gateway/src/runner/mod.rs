@@ -559,10 +559,10 @@ fn record(
         return Ok((None, Vec::new()));
     }
     let file = capture.map(|path| Settings { interfaces: interfaces(config), ..Settings::new(path) });
-    let depth = if file.is_some() { CAPTURE_DEPTH } else { recording::DEPTH };
     // The buses, and for each device its I/O and its explicit side.
     let buses = usize::from(config.sercos.is_some()) + config.can.len() + config.devicenet.len();
     let taps = buses + 2 * config.devices.len();
+    let depth = if file.is_some() { CAPTURE_DEPTH } else { recording::depth(taps) };
     let (recorder, taps) =
         Recorder::start_with(file, recording.map(Recording::sink), depth, taps).map_err(|source| {
             match capture {
