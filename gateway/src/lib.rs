@@ -1,6 +1,7 @@
 //! The Axisbridge gateway.
 
 pub mod alone;
+pub mod bundle;
 pub mod capture;
 pub mod check;
 pub mod cli;
@@ -19,6 +20,7 @@ pub mod log_limit;
 pub mod modbus;
 pub mod north;
 pub mod parameter;
+pub mod recording;
 mod replace_file;
 pub mod runner;
 pub mod scan;

@@ -6,7 +6,12 @@ use std::path::{Path, PathBuf};
 
 /// Writes a new file and puts it in the place of the old one, so that a loss of power leaves the old one or the new one.
 pub(crate) fn replace_file(path: &Path, text: &str) -> io::Result<()> {
-    replace_on(&mut Host, path, text.as_bytes())
+    replace_with(path, text.as_bytes())
+}
+
+/// The same with bytes.
+pub(crate) fn replace_with(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    replace_on(&mut Host, path, bytes)
 }
 
 /// The steps of a replacement, so that a test can cut the power between any two of them.

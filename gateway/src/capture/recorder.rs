@@ -1,12 +1,12 @@
 //! Records what the box sends and receives, without the cycle thread ever waiting for a disk.
 //!
-//! Whoever sees traffic holds a [`Tap`]: a queue of fixed-size records to one writer thread. Pushing copies
-//! the bytes and returns; when the queue is full the record is dropped and counted. The writer thread takes
-//! the oldest record of all taps, dresses socket payloads up as frames ([`super::synth`]) and writes the
-//! file, up to a limit of bytes.
+//! Whoever sees traffic holds a [`Tap`]: a queue of fixed-size records to one recorder thread. Pushing copies
+//! the bytes and returns; when the queue is full the record is dropped and counted. The recorder thread takes
+//! the oldest record of all taps and dresses socket payloads up as frames ([`super::synth`]). The frames go to
+//! a file, up to a limit of bytes, and to a [`FrameSink`].
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Write};
 use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,27 +23,53 @@ use super::writer::Writer;
 use super::{FRAME_LEN_MAX, Side};
 use crate::sys::clock::KernelTime;
 
-/// Bytes after which a recording is full, unless told otherwise.
+/// Bytes after which a recording is full, unless configured.
 pub const FILE_LEN_MAX_DEFAULT: u64 = 4 << 30;
 
 /// Interfaces of a file.
 const SIDES: usize = Side::COUNT;
 
-/// How long the writer thread sleeps when it has nothing to do.
+/// How long the recorder thread sleeps when it has nothing to do.
 const IDLE: Duration = Duration::from_millis(2);
 
-/// What is recorded, and how.
+/// Descriptions of the interfaces of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Interfaces {
+    /// Of the north interface, such as its IP address.
+    pub north: String,
+    /// Of the two SERCOS ports, such as the names of their network interfaces.
+    pub south: [String; 2],
+    /// Of the CAN buses, such as the names of their network interfaces; none that are not here are recorded.
+    pub can: Vec<String>,
+}
+
+impl Interfaces {
+    /// Begins a recording with these interfaces.
+    ///
+    /// # Errors
+    /// What the destination says.
+    pub fn writer<W: Write>(&self, destination: W) -> io::Result<Writer<W>> {
+        let [one, two] = &self.south;
+        let can: Vec<&str> = self.can.iter().map(String::as_str).collect();
+        Writer::new(destination, [&self.north, one, two], &can)
+    }
+}
+
+impl Default for Interfaces {
+    fn default() -> Self {
+        let south = ["SERCOS III".to_owned(), "SERCOS III".to_owned()];
+        Self { north: "EtherNet/IP".to_owned(), south, can: Vec::new() }
+    }
+}
+
+/// What is recorded to a file, and how.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// The file; overwritten if there.
     pub path: PathBuf,
-    /// Description of the north interface in the file, such as its IP address.
-    pub north: String,
-    /// Descriptions of the two SERCOS ports in the file, such as the names of their network interfaces.
-    pub south: [String; 2],
-    /// Descriptions of the CAN buses, such as the names of their network interfaces; none that are not here are recorded.
-    pub can: Vec<String>,
-    /// Records each tap can hold until the writer thread takes them; each takes about 1.5 KiB.
+    /// Its interfaces.
+    pub interfaces: Interfaces,
+    /// Records each tap can hold until the recorder thread takes them; each takes about 1.5 KiB.
     pub depth: usize,
     /// Bytes of the file at which recording ends; what comes after counts as dropped.
     pub file_len_max: u64,
@@ -55,9 +81,7 @@ impl Settings {
     pub fn new(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
-            north: "EtherNet/IP".to_owned(),
-            south: ["SERCOS III".to_owned(), "SERCOS III".to_owned()],
-            can: Vec::new(),
+            interfaces: Interfaces::default(),
             depth: 1024,
             file_len_max: FILE_LEN_MAX_DEFAULT,
         }
@@ -80,6 +104,15 @@ enum Kind {
     Opened { client: SocketAddrV4, server: SocketAddrV4 },
     Stream { from: SocketAddrV4, to: SocketAddrV4 },
     Closed { from: SocketAddrV4, to: SocketAddrV4 },
+}
+
+/// Takes frames on the recorder thread, which may lock and allocate.
+pub trait FrameSink: Send {
+    /// A round of the recorder thread begins: it comes at least every few milliseconds. `lost` records were dropped so far.
+    fn round(&mut self, lost: u64);
+
+    /// The next frame, by time of the records.
+    fn frame(&mut self, at: KernelTime, side: Side, frame: &[u8]);
 }
 
 impl Kind {
@@ -179,34 +212,37 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates the file and starts the writer thread with `taps` taps, in the order in which they are
+    /// Creates the file and starts the recorder thread with `taps` taps, in the order in which they are
     /// returned.
     ///
     /// # Errors
     /// The file cannot be created, or the thread not started.
     pub fn start(settings: Settings, taps: usize) -> io::Result<(Self, Vec<Tap>)> {
-        let file = File::create(&settings.path)?;
-        let [one, two] = &settings.south;
-        let can: Vec<&str> = settings.can.iter().map(String::as_str).collect();
-        let writer = Writer::new(file, [&settings.north, one, two], &can)?;
-        let dropped = Arc::new([const { AtomicU64::new(0) }; SIDES]);
+        let depth = settings.depth;
+        Self::start_with(Some(settings), None, depth, taps)
+    }
+
+    /// The same, with frames to a file, to a sink, or to both. Each tap holds `depth` records.
+    ///
+    /// # Errors
+    /// The file cannot be created, or the thread not started.
+    pub fn start_with(
+        file: Option<Settings>,
+        sink: Option<Box<dyn FrameSink>>,
+        depth: usize,
+        taps: usize,
+    ) -> io::Result<(Self, Vec<Tap>)> {
+        let file = file.map(FileEnd::create).transpose()?;
+        let lost = Arc::new([const { AtomicU64::new(0) }; SIDES]);
         let mut queues = Vec::with_capacity(taps);
         let mut ends = Vec::with_capacity(taps);
         for _ in 0..taps {
-            let (producer, consumer) = RingBuffer::new(settings.depth);
-            ends.push(Tap { queue: producer, dropped: Arc::clone(&dropped) });
+            let (producer, consumer) = RingBuffer::new(depth);
+            ends.push(Tap { queue: producer, dropped: Arc::clone(&lost) });
             queues.push(consumer);
         }
         let stop = Arc::new(AtomicBool::new(false));
-        let task = Task {
-            queues,
-            dropped,
-            writer,
-            synth: Synthesizer::new(),
-            written: [0; SIDES],
-            failed: None,
-            limit: settings.file_len_max,
-        };
+        let task = Task { queues, lost, synth: Synthesizer::new(), file, sink };
         let flag = Arc::clone(&stop);
         let thread =
             std::thread::Builder::new().name("recorder".to_owned()).spawn(move || task.run(&flag))?;
@@ -223,15 +259,65 @@ impl Recorder {
     }
 }
 
-/// The writer thread.
-struct Task {
-    queues: Vec<Consumer<Record>>,
-    dropped: Arc<[AtomicU64; SIDES]>,
+/// The file of a recording.
+struct FileEnd {
     writer: Writer<File>,
-    synth: Synthesizer,
     written: [u64; SIDES],
+    dropped: [u64; SIDES],
     failed: Option<io::Error>,
     limit: u64,
+}
+
+impl FileEnd {
+    fn create(settings: Settings) -> io::Result<Self> {
+        let writer = settings.interfaces.writer(File::create(&settings.path)?)?;
+        let limit = settings.file_len_max;
+        Ok(Self { writer, written: [0; SIDES], dropped: [0; SIDES], failed: None, limit })
+    }
+
+    /// Whether a record of this side is written; otherwise it counts as dropped.
+    fn takes(&mut self, side: Side) -> bool {
+        let described = match side {
+            Side::Can(bus) => usize::from(bus) < self.writer.can_buses(),
+            _ => true,
+        };
+        let takes = described && self.failed.is_none() && self.writer.bytes_written() < self.limit;
+        self.dropped[side.index()] += u64::from(!takes);
+        takes
+    }
+
+    fn frame(&mut self, at: KernelTime, side: Side, frame: &[u8]) {
+        match self.writer.frame(side, at, frame, None) {
+            Ok(()) => self.written[side.index()] += 1,
+            Err(error) => self.failed = Some(error),
+        }
+    }
+
+    /// Closes the file; `lost` were dropped before they came here.
+    fn finish(mut self, last: KernelTime, lost: [u64; SIDES]) -> io::Result<Summary> {
+        if let Some(error) = self.failed {
+            return Err(error);
+        }
+        let mut dropped = 0;
+        for (index, side) in Side::all(self.writer.can_buses()).enumerate() {
+            let of_side = self.dropped[index] + lost[index];
+            self.writer.statistics(side, last, self.written[index] + of_side, of_side)?;
+        }
+        for (own, lost) in self.dropped.iter().zip(lost) {
+            dropped += own + lost;
+        }
+        self.writer.finish()?;
+        Ok(Summary { frames: self.written.iter().sum(), dropped })
+    }
+}
+
+/// The recorder thread.
+struct Task {
+    queues: Vec<Consumer<Record>>,
+    lost: Arc<[AtomicU64; SIDES]>,
+    synth: Synthesizer,
+    file: Option<FileEnd>,
+    sink: Option<Box<dyn FrameSink>>,
 }
 
 impl Task {
@@ -240,12 +326,15 @@ impl Task {
         loop {
             // Read before draining: what was pushed before the request to stop is still written.
             let stopping = stop.load(Ordering::Acquire);
+            if let Some(sink) = &mut self.sink {
+                sink.round(self.lost.iter().map(|counter| counter.load(Ordering::Relaxed)).sum());
+            }
             // Bounded by what the queues hold, so that a flood cannot keep the thread from stopping.
             let waiting: usize = self.queues.iter().map(Consumer::slots).sum();
             for _ in 0..waiting {
                 let Some(record) = self.oldest() else { break };
                 last = last.max(record.at);
-                self.write(&record);
+                self.take(&record);
             }
             if stopping {
                 break;
@@ -254,15 +343,8 @@ impl Task {
                 std::thread::sleep(IDLE);
             }
         }
-        let dropped = self.dropped.each_ref().map(|counter| counter.load(Ordering::Relaxed));
-        if let Some(error) = self.failed {
-            return Err(error);
-        }
-        for (index, side) in Side::all(self.writer.can_buses()).enumerate() {
-            self.writer.statistics(side, last, self.written[index] + dropped[index], dropped[index])?;
-        }
-        self.writer.finish()?;
-        Ok(Summary { frames: self.written.iter().sum(), dropped: dropped.iter().sum() })
+        let lost = self.lost.each_ref().map(|counter| counter.load(Ordering::Relaxed));
+        self.file.map_or(Ok(Summary::default()), |file| file.finish(last, lost))
     }
 
     /// Takes the record with the smallest time at the head of any queue.
@@ -273,28 +355,27 @@ impl Task {
         self.queues[index].pop().ok()
     }
 
-    fn write(&mut self, record: &Record) {
+    fn take(&mut self, record: &Record) {
         let side = record.kind.side();
-        let described = match side {
-            Side::Can(bus) => usize::from(bus) < self.writer.can_buses(),
-            _ => true,
-        };
-        if !described || self.failed.is_some() || self.writer.bytes_written() >= self.limit {
-            count(&self.dropped, side);
-            return;
-        }
         let data = &record.data[..usize::from(record.len)];
-        let Self { writer, synth, written, failed, .. } = self;
-        let index = side.index();
-        let mut emit = |frame: &[u8]| match writer.frame(side, record.at, frame, None) {
-            Ok(()) => written[index] += 1,
-            Err(error) => *failed = Some(error),
+        let Self { synth, file, sink, lost, .. } = self;
+        let mut file = file.as_mut();
+        if !file.as_mut().is_some_and(|file| file.takes(side)) {
+            file = None;
+        }
+        let mut emit = |frame: &[u8]| {
+            if let Some(file) = &mut file {
+                file.frame(record.at, side, frame);
+            }
+            if let Some(sink) = sink.as_mut() {
+                sink.frame(record.at, side, frame);
+            }
         };
         match record.kind {
             Kind::Frame(_) => emit(data),
             Kind::Datagram { from, to, tos } => {
                 if synth.udp(from, to, tos, data, &mut emit).is_err() {
-                    count(&self.dropped, side);
+                    count(lost, side);
                 }
             }
             Kind::Opened { client, server } => synth.tcp_open(client, server, &mut emit),
@@ -334,7 +415,8 @@ mod tests {
     #[test]
     fn frames_of_a_can_bus_have_an_interface_of_their_own() {
         let path = path("can");
-        let settings = Settings { can: vec!["can0".to_owned()], ..Settings::new(&path) };
+        let interfaces = Interfaces { can: vec!["can0".to_owned()], ..Interfaces::default() };
+        let settings = Settings { interfaces, ..Settings::new(&path) };
         let (recorder, mut taps) = Recorder::start(settings, 1).unwrap();
         let id = profile_generic::can::Id::Standard(0x181);
         taps[0].can_frame(KernelTime(5), 0, &Frame::new(id, &[1, 2, 3]).unwrap());

@@ -13,6 +13,9 @@ const LINE_MAX: u64 = 2 * 1_024 * 1_024;
 /// Most lines of a reply: a drive has a list of up to 16384 IDNs.
 const LINES_MAX: usize = 65_536;
 
+/// Most bytes of a file: what the memory of a recording can have, and the heads of its blocks.
+const FILE_MAX: u64 = 4_000_000_000;
+
 /// A connection to the socket.
 pub struct GatewayClient {
     stream: BufReader<UnixStream>,
@@ -45,6 +48,27 @@ impl GatewayClient {
         stream.set_read_timeout(Some(patience))?;
         stream.set_write_timeout(Some(patience))?;
         Ok(Self { stream: BufReader::new(stream) })
+    }
+
+    /// Asks for a file, and waits for all its bytes.
+    pub fn file(&mut self, request: &str) -> Result<Vec<u8>, CliError> {
+        let Reply { last, .. } = self.ask(request)?;
+        let word = request.split(' ').next().unwrap_or_default();
+        let length = last.strip_prefix(&format!("ok {word} bytes=")).and_then(|text| text.parse().ok());
+        let Some(length) = length.filter(|length| *length <= FILE_MAX) else {
+            return Err(match last.split_once(": ") {
+                Some((head, text)) if head.starts_with("error ") => text.into(),
+                _ => format!("expected a reply `ok {word} bytes=N`, got `{last}`").into(),
+            });
+        };
+        let mut file = Vec::new();
+        let read = self.stream.by_ref().take(length).read_to_end(&mut file);
+        read.map_err(|error| format!("the gateway does not send the whole file: {error}"))?;
+        let found = u64::try_from(file.len())?;
+        if found != length {
+            return Err(format!("the file ends after {found} of {length} bytes").into());
+        }
+        Ok(file)
     }
 
     /// Sends a request and waits for its reply.

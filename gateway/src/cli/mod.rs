@@ -4,7 +4,9 @@
 
 mod assembly;
 mod attributes;
+mod bundle;
 mod check;
+mod contacts;
 mod decode;
 mod demo;
 mod dictionary;
@@ -18,6 +20,7 @@ mod manual;
 pub(crate) mod param;
 mod plc;
 mod progress;
+mod record;
 mod report;
 mod run;
 mod scan;
@@ -59,6 +62,12 @@ enum Command {
     Log(LogArguments),
     /// Show the faults that are present, and the history of faults of each axis.
     Faults(FaultsArguments),
+    /// Write the last seconds of the frames of all sides of a running gateway to a file (pcapng).
+    Record(RecordArguments),
+    /// Show how controllers opened their last connections: phases, refused services, and what is awaited.
+    Contacts(ContactsArguments),
+    /// Write everything that helps to find a fault of a running gateway into one archive (tar).
+    Bundle(BundleArguments),
     /// Read, write, back up, restore and compare the parameters of a drive, and execute its commands.
     #[command(subcommand)]
     Param(param::ParamCommand),
@@ -181,6 +190,48 @@ struct FaultsArguments {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
+}
+
+/// Arguments of `record`.
+#[derive(Debug, Args)]
+struct RecordArguments {
+    /// The Unix socket of the running gateway (`run --local`).
+    #[arg(long, value_name = "SOCKET", default_value = "/run/axisbridge/local")]
+    local: PathBuf,
+    /// Only the last seconds. Without it, as many as the gateway keeps (1 to 600).
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..=600))]
+    last: Option<u32>,
+    /// The file to write. An existing file is replaced.
+    #[arg(long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Arguments of `contacts`.
+#[derive(Debug, Args)]
+struct ContactsArguments {
+    /// The Unix socket of the running gateway (`run --local`).
+    #[arg(long, value_name = "SOCKET", default_value = "/run/axisbridge/local")]
+    local: PathBuf,
+    /// Only the contact with this number.
+    #[arg(value_name = "N")]
+    number: Option<u64>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Write the frames of the contact to this file as well. An existing file is replaced.
+    #[arg(long, value_name = "FILE", requires = "number")]
+    pcapng: Option<PathBuf>,
+}
+
+/// Arguments of `bundle`.
+#[derive(Debug, Args)]
+struct BundleArguments {
+    /// The Unix socket of the running gateway (`run --local`).
+    #[arg(long, value_name = "SOCKET", default_value = "/run/axisbridge/local")]
+    local: PathBuf,
+    /// The file to write. An existing file is replaced.
+    #[arg(long, value_name = "FILE.tar")]
+    output: PathBuf,
 }
 
 /// Arguments of `check`.
@@ -770,6 +821,9 @@ pub fn main() -> ExitCode {
         Command::Status(arguments) => status::run(&arguments),
         Command::Log(arguments) => log::run(&arguments),
         Command::Faults(arguments) => faults::run(&arguments),
+        Command::Record(arguments) => record::run(&arguments),
+        Command::Contacts(arguments) => contacts::run(&arguments),
+        Command::Bundle(arguments) => bundle::run(&arguments),
         Command::Param(command) => param::run(&command),
         Command::Check(arguments) => check::run(&arguments),
         Command::Eds(arguments) => eds::run(&arguments),
@@ -820,6 +874,12 @@ fn has_colours(stream: &impl IsTerminal) -> bool {
 fn print(data: impl AsRef<[u8]>, code: ExitCode) -> Result<ExitCode, CliError> {
     let mut out = io::stdout().lock();
     written_to_end(out.write_all(data.as_ref()).and_then(|()| out.flush()), code)
+}
+
+/// Writes a file that the user has named.
+fn write_file(path: &std::path::Path, content: &[u8]) -> Result<ExitCode, CliError> {
+    std::fs::write(path, content).map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The exit status when output was written, or why it was not.

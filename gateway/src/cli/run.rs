@@ -15,6 +15,7 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 
 use super::service_manager::ServiceManager;
 use super::{CliError, RunArguments, has_colours};
+use crate::bundle::Files;
 use crate::check::{Request, check};
 use crate::config::{Config, LogLevel};
 use crate::finding::{Finding, Findings, Severity};
@@ -54,9 +55,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
 /// A configuration and its tables, without errors.
 struct Good {
     config: Config,
-    /// The text of the configuration.
-    text: Option<Arc<str>>,
     mapping: Mapping,
+    files: Files,
 }
 
 /// What the box is asked for from outside.
@@ -83,10 +83,18 @@ fn read(path: &Path) -> Result<(Good, Findings), Findings> {
     let outcome = check(&Request { config: Some(path), mappings: &[], frames: false });
     match (outcome.config, outcome.tables.mapping) {
         (Some(config), Some(mapping)) if !outcome.tables.findings.has_errors() => {
-            Ok((Good { config, text: outcome.text, mapping }, outcome.tables.findings))
+            let findings = outcome.tables.findings;
+            let configuration = outcome.text.map_or_else(String::new, |text| text.to_string());
+            let files = Files { configuration, findings: lines(&findings) };
+            Ok((Good { config, mapping, files }, findings))
         }
         _ => Err(outcome.tables.findings),
     }
+}
+
+/// The findings, one a line.
+fn lines(findings: &Findings) -> String {
+    findings.list().iter().map(|finding| format!("{finding}\n")).collect()
 }
 
 /// Why the files are refused, with what else asks for something; notes on tables as they are shipped are for `check`.
@@ -113,8 +121,8 @@ fn run_once(
     let extras = runner::Extras {
         capture: arguments.capture.as_deref(),
         local: arguments.local.as_deref(),
-        configuration: good.text.as_deref(),
         histories: Some(histories),
+        files: Some(&good.files),
     };
     let running = runner::start(&good.config, good.mapping.clone(), extras, settings)?;
     let mut told = false;

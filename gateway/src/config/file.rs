@@ -28,6 +28,8 @@ pub struct File {
     pub history: Option<HistoryTable>,
     /// The Modbus TCP server. Default: none.
     pub modbus: Option<ModbusTable>,
+    /// The rolling recording of all sides. Default: on, with the defaults of its keys.
+    pub recording: Option<RecordingTable>,
     /// The HTTP server with the state of the gateway. Default: none.
     pub http: Option<HttpTable>,
     /// Mapping tables. Default: the built-in ones.
@@ -105,6 +107,18 @@ pub struct HistoryTable {
     /// Directory in which the history of faults is kept, relative to the folder of this file. It is made if it is not there.
     #[schemars(transform = form::path)]
     pub directory: Spanned<String>,
+}
+
+/// `[recording]`
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingTable {
+    /// Length of the longest recording that can be taken, 0 to 600; 0 keeps no frames. Default: 10.
+    #[schemars(range(min = 0, max = 600))]
+    pub seconds: Option<Spanned<i64>>,
+    /// Memory for frames, `"2 MB"` to `"1 GB"`: half for the last seconds, half for the first contacts. Default: `"16 MB"`.
+    #[schemars(transform = form::size)]
+    pub memory: Option<Spanned<String>>,
 }
 
 /// `[modbus]`

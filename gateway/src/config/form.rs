@@ -34,6 +34,13 @@ pub fn time(schema: &mut Schema) {
     pattern(schema, format!("^\\s*({})\\s*$", units.join("|").replace("\\.0*", "\\.0+")));
 }
 
+/// The memory of the rolling recording, 2 MB to 1 GB: a whole number and a unit.
+pub fn size(schema: &mut Schema) {
+    let kilo = "0*([2-9][0-9]{3}|[1-9][0-9]{4,5}|1000000)\\s*kB";
+    let mega = "0*([2-9]|[1-9][0-9]{1,2}|1000)\\s*MB";
+    pattern(schema, format!("^\\s*({kilo}|{mega}|0*1\\s*GB)\\s*$"));
+}
+
 /// A torque or force: a decimal number above zero with at most six decimals, and a unit.
 pub fn torque(schema: &mut Schema) {
     pattern(schema, "^\\s*(?=[^1-9]*[1-9])[0-9]+(\\.[0-9]{1,6}0*)?\\s*(Nm|N)\\s*$");

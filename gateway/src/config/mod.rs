@@ -19,6 +19,7 @@ mod named;
 mod rated;
 pub mod scalar;
 mod sercos;
+pub(crate) mod size;
 mod startup_file;
 
 use std::net::SocketAddr;
@@ -72,6 +73,8 @@ pub struct Config {
     pub settings_file: Option<PathBuf>,
     /// Where the history of faults is kept; `None` keeps it until the process ends.
     pub history_dir: Option<PathBuf>,
+    /// The rolling recording; `None` for none.
+    pub recording: Option<RollingRecording>,
     /// The CIP Motion devices seen by controllers.
     pub devices: Vec<Device>,
     /// All axes, in the order of the file.
@@ -334,6 +337,15 @@ pub struct Modbus {
     pub clients_max: u8,
     /// Registers that are parameters of drives.
     pub parameters: Vec<ModbusParameter>,
+}
+
+/// The rolling recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RollingRecording {
+    /// Length of the longest recording that can be taken, 1 to 600 seconds.
+    pub seconds: u32,
+    /// Bytes of memory for frames, 2 MB to 1 GB.
+    pub memory: usize,
 }
 
 /// The HTTP server.

@@ -70,6 +70,7 @@ fn defaults_are_those_of_the_documentation() {
         (&Time::default(), LogLevel::Info, None, None)
     );
     assert_eq!((&config.mappings_dir, &config.settings_file, &config.history_dir), (&None, &None, &None));
+    assert_eq!(config.recording, Some(RollingRecording { seconds: 10, memory: 16_000_000 }));
     assert_eq!(config.overlays.len(), 0);
     let device = &config.devices[0];
     assert_eq!(
@@ -506,7 +507,7 @@ fn the_reference_describes_every_key() {
         // The tables of the top level stand in their headings, without a row of their own.
         let shown = match key {
             "the_box" => "`[box]`".to_owned(),
-            "time" | "log" | "history" | "modbus" | "http" | "mappings" => format!("`[{key}]`"),
+            "time" | "log" | "history" | "recording" | "modbus" | "http" | "mappings" => format!("`[{key}]`"),
             "device" | "axis" => format!("`[[{key}]]`"),
             "south" => "`[south]`".to_owned(),
             key => format!("`{key}`"),

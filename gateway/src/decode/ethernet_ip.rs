@@ -47,9 +47,30 @@ pub(super) struct EtherNetIp {
 struct Context {
     connections: Connections,
     pending: VecDeque<(Key, Asked)>,
+    /// Replies since they were taken, where somebody takes them.
+    replies: Option<Vec<Answered>>,
+}
+
+/// A CIP reply of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Answered {
+    /// The last class that its request names; `None` where the request was not seen.
+    pub class: Option<u32>,
+    /// The reply.
+    pub reply: Vec<u8>,
 }
 
 impl EtherNetIp {
+    /// One that collects the replies for [`Self::take_replies`].
+    pub fn collecting() -> Self {
+        Self { context: Context { replies: Some(Vec::new()), ..Context::default() }, ..Self::default() }
+    }
+
+    /// The replies since the last call.
+    pub fn take_replies(&mut self) -> Vec<Answered> {
+        self.context.replies.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
     /// The target of a connection, and whether it is one of CIP Motion.
     pub fn connection(&self, id: u32, from: Ipv4Addr, to: Ipv4Addr) -> Option<(Ipv4Addr, bool)> {
         let (connection, _) = self.context.connections.find(id, from, to)?;
@@ -234,6 +255,10 @@ impl Context {
         }
         let index = self.pending.iter().position(|(known, _)| *known == key);
         let asked = index.and_then(|index| self.pending.remove(index)).map(|(_, asked)| asked);
+        if let Some(replies) = &mut self.replies {
+            let class = asked.and_then(|asked| asked.class);
+            replies.push(Answered { class, reply: bytes.to_vec() });
+        }
         match explicit::reply(bytes, asked, 2, text) {
             Some(Effect::Opened { opening, o_to_t_id, t_to_o_id }) => self.connections.opened(Connection {
                 opening,

@@ -289,7 +289,8 @@ fn motion_body(tree: &str, level: usize, text: &mut Text) {
     }
 }
 
-fn service_name(service: Service, class: Option<u32>) -> String {
+/// The name of a service of a class.
+pub(super) fn service_name(service: Service, class: Option<u32>) -> String {
     match MotionService(service.0).name() {
         Some(name) if class == Some(CLASS_MOTION) && service.name().is_none() => name.to_owned(),
         _ => service.to_string(),

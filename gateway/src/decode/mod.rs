@@ -8,6 +8,7 @@
 mod canopen;
 mod connections;
 mod devicenet;
+pub(crate) mod dialogue;
 mod ethernet_ip;
 mod explicit;
 pub(crate) mod packet;

@@ -21,7 +21,9 @@ pub fn text(diagnosis: &Diagnosis) -> String {
         }
         line(&mut out, check);
     }
-    out.push_str("cycles\n");
+    if !diagnosis.cycles.is_empty() {
+        out.push_str("cycles\n");
+    }
     for result in &diagnosis.cycles {
         cycle(&mut out, result);
     }

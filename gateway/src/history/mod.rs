@@ -39,9 +39,14 @@ pub struct Histories {
 const LAST_SECOND: Duration = Duration::from_secs(253_402_300_799);
 
 /// A time of the host as text: UTC, RFC 3339, microseconds. A clock that is set beyond what the text can have is at its end.
-fn utc(time: SystemTime) -> String {
+pub(crate) fn utc(time: SystemTime) -> String {
     let since = time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().min(LAST_SECOND);
     humantime::format_rfc3339_micros(SystemTime::UNIX_EPOCH + since).to_string()
+}
+
+/// The same of nanoseconds since 1970.
+pub(crate) fn utc_nanos(nanos: u64) -> String {
+    utc(SystemTime::UNIX_EPOCH + Duration::from_nanos(nanos))
 }
 
 /// The lines that this thread logs while `run` runs.

@@ -3,6 +3,7 @@
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
+use super::downloads::{self, ContactList};
 use super::sheet::AxisSheet;
 use super::traces::{AxisTraces, TimeTraces};
 use super::view::{FaultList, HTTP_FAULTS_MAX, HTTP_LINES_MAX, LogLines, Look};
@@ -26,6 +27,7 @@ pub fn openapi() -> Value {
     let traces = generator.subschema_for::<AxisTraces>();
     let times = generator.subschema_for::<TimeTraces>();
     let sheet = generator.subschema_for::<AxisSheet>();
+    let contacts = generator.subschema_for::<ContactList>();
     let schemas = generator.take_definitions(false);
     let json = |schema: &schemars::Schema| json!({ "application/json": { "schema": schema } });
     let text = |kind: &str| json!({ kind: { "schema": { "type": "string" } } });
@@ -108,7 +110,7 @@ pub fn openapi() -> Value {
         json!({ "200": good("Its keys and values", text("application/toml")), "404": missing }),
     );
     let status = "The same object as that of `axisbridge status --json`";
-    json!({
+    let mut description = json!({
         "openapi": "3.1.0",
         "info": {
             "title": "Axisbridge",
@@ -142,12 +144,17 @@ pub fn openapi() -> Value {
             ),
         },
         "components": { "schemas": schemas },
-    })
+    });
+    for (path, described) in downloads::describe(&json!(contacts)) {
+        description["paths"][path] = described;
+    }
+    description
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::contact::{Contact, Phase, PhaseReached, RefusedService};
 
     #[test]
     fn answer_has_exactly_the_fields_of_the_schema() {
@@ -168,6 +175,13 @@ mod tests {
         ] {
             compare(&description, &description["components"]["schemas"][name], &answer, name);
         }
+        let contact = Contact {
+            phases: vec![PhaseReached { phase: Phase::GroupSync, after_ms: 1 }],
+            refused: vec![RefusedService::default()],
+            ..Contact::default()
+        };
+        let contacts = serde_json::to_value(ContactList { contacts: vec![contact] }).unwrap();
+        compare(&description, &description["components"]["schemas"]["ContactList"], &contacts, "ContactList");
         let reference = &description["paths"]["/api/v1/status"]["get"]["responses"]["200"]["content"]["application/json"]
             ["schema"]["$ref"];
         assert_eq!(reference, "#/components/schemas/Overview");

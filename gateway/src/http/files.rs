@@ -18,28 +18,3 @@ impl Files {
         self.sheets.iter().find(|(name, _)| name == device).map(|(_, sheet)| &**sheet)
     }
 }
-
-/// The keys and values of a configuration without its comments: people write things there that are not for all who see the page.
-/// `None` for what is no TOML.
-#[must_use]
-pub fn without_comments(text: &str) -> Option<String> {
-    let table: toml::Table = toml::from_str(text).ok()?;
-    toml::to_string(&table).ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::config::Config;
-
-    #[test]
-    fn configuration_keeps_its_meaning_and_loses_its_comments() {
-        let text = "# ask Ann, password swordfish\n[box]\nname = \"cell # 4\" # behind the press\n";
-        assert_eq!(without_comments(text).as_deref(), Some("[box]\nname = \"cell # 4\"\n"));
-        assert_eq!(without_comments("[box\n"), None);
-        let example = include_str!("../../../examples/two-axes-in-process.toml");
-        let plain = without_comments(example).unwrap();
-        assert!(example.contains("\n# ") && !plain.lines().any(|line| line.starts_with('#')), "{plain}");
-        assert_eq!(Config::parse(&plain, "").unwrap(), Config::parse(example, "").unwrap());
-    }
-}

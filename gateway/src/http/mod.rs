@@ -5,12 +5,14 @@
 //!    histories ------------/   \--------> /api/v1/faults /api/v1/log
 //!                           |\--twice a second--> /events --> page in a browser
 //!                            \--ten times a second--> Traces --> /api/v1/traces /api/v1/time
+//!    recording, contacts ---------------> /recording.pcapng /api/v1/contacts /contact.pcapng /bundle
 //! ```
 //!
 //! The server has one thread of its own, below the priority of every other one, and takes only what the cycle thread
 //! publishes anyway: requests, viewers and floods cost the cycle nothing. No request changes anything.
 
 mod api;
+mod downloads;
 mod events;
 mod files;
 mod health;
@@ -26,7 +28,8 @@ mod traces;
 mod view;
 
 pub use api::openapi;
-pub use files::{Files, without_comments};
+pub use downloads::ContactList;
+pub use files::Files;
 pub use health::Health;
 pub use metrics::metrics;
 pub use server::{HttpServer, RunningServer};

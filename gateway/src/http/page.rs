@@ -15,5 +15,6 @@ pub const JS: &str = concat!(
     include_str!("page/time.js"),
     include_str!("page/mapping.js"),
     include_str!("page/downloads.js"),
+    include_str!("page/contacts.js"),
     include_str!("page/views.js"),
 );

@@ -13,8 +13,10 @@ use axum::middleware::map_response;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use serde::Serialize;
+use tokio::sync::Semaphore;
 
 use super::api::openapi;
+use super::downloads;
 use super::events::Events;
 use super::metrics::metrics;
 use super::page;
@@ -22,8 +24,8 @@ use super::server::Load;
 use super::view::{HTTP_LINES_MAX, View};
 use crate::local::protocol::{BadRequest, after_query, axis_query, fault_query, log_query, trace_query};
 
-const TEXT: &str = "text/plain; charset=utf-8";
-const JSON: &str = "application/json";
+pub(super) const TEXT: &str = "text/plain; charset=utf-8";
+pub(super) const JSON: &str = "application/json";
 const TOML: &str = "application/toml";
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
@@ -48,6 +50,8 @@ pub struct Sources {
     pub events: Arc<Events>,
     /// The server's own counters.
     pub load: Arc<Load>,
+    /// One file is made and sent at a time.
+    pub downloads: Arc<Semaphore>,
 }
 
 /// The paths of the server. `GET` and `HEAD` are answered; every other method is refused.
@@ -68,6 +72,7 @@ pub fn routes(sources: Sources) -> Router {
         .route("/api/v1/axis", get(axis))
         .route("/api/v1/eds", get(eds))
         .route("/api/v1/configuration", get(configuration))
+        .merge(downloads::routes())
         .route("/api/v1/openapi.json", get(async || typed(JSON, openapi().to_string())))
         .fallback(async || (StatusCode::NOT_FOUND, typed(TEXT, "there is nothing at this path\n")))
         .layer(map_response(with_headers))
@@ -81,7 +86,7 @@ async fn with_headers(mut response: Response) -> Response {
     response
 }
 
-fn typed(kind: &'static str, body: impl IntoResponse) -> Response {
+pub(super) fn typed(kind: &'static str, body: impl IntoResponse) -> Response {
     ([(CONTENT_TYPE, kind)], body).into_response()
 }
 
@@ -178,11 +183,11 @@ fn json(object: &impl Serialize) -> Response {
 }
 
 /// The parts of a query: names of axes and numbers need no escapes.
-fn words(query: Option<&str>) -> Vec<&str> {
+pub(super) fn words(query: Option<&str>) -> Vec<&str> {
     query.unwrap_or_default().split('&').filter(|word| !word.is_empty()).collect()
 }
 
-fn refused(error: &BadRequest) -> Response {
+pub(super) fn refused(error: &BadRequest) -> Response {
     (StatusCode::BAD_REQUEST, typed(TEXT, format!("{error}\n"))).into_response()
 }
 

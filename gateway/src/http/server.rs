@@ -145,7 +145,12 @@ impl HttpServer {
         let view = Arc::new(view);
         let events = Arc::new(Events::new(Arc::clone(&view), self.connections_max / 2));
         let load = Arc::new(Load::default());
-        let router = routes(Sources { view, events: Arc::clone(&events), load: Arc::clone(&load) });
+        let router = routes(Sources {
+            view,
+            events: Arc::clone(&events),
+            load: Arc::clone(&load),
+            downloads: Arc::new(Semaphore::new(1)),
+        });
         let places = Arc::new(Semaphore::new(self.connections_max));
         tokio::spawn(async move { events.run().await });
         loop {

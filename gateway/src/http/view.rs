@@ -1,6 +1,6 @@
 //! What the server sees of the gateway: the published status, system time, and the names.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Instant, SystemTime};
 
 use schemars::JsonSchema;
@@ -10,6 +10,7 @@ use super::files::Files;
 use super::health::Health;
 use super::sheet::{AxisSheet, Sheets};
 use super::traces::{AxisTraces, TimeTraces, Traces};
+use crate::bundle::Sources;
 use crate::history::{FaultRecord, Histories, LogEvent, LogQuery, Selection};
 use crate::latest::Reader;
 use crate::local::installation::Installation;
@@ -36,6 +37,8 @@ pub struct View {
     started: SystemTime,
     /// What the charts show. Only the server's thread takes the lock.
     traces: Mutex<Traces>,
+    /// What downloads are made of; `None` without any.
+    sources: Option<Arc<Sources>>,
     /// Of the published status. Only the server's thread takes the lock.
     heartbeat: Mutex<Heartbeat>,
 }
@@ -99,7 +102,19 @@ impl View {
         started: SystemTime,
     ) -> Self {
         let heartbeat = Mutex::new(Heartbeat::new(Instant::now()));
-        Self { installation, status, time, histories, fixed, started, traces: Mutex::default(), heartbeat }
+        let traces = Mutex::default();
+        Self { installation, status, time, histories, fixed, started, traces, sources: None, heartbeat }
+    }
+
+    /// The same, with recordings, contacts and bundles for download.
+    #[must_use]
+    pub fn with_sources(self, sources: Arc<Sources>) -> Self {
+        Self { sources: Some(sources), ..self }
+    }
+
+    /// What downloads are made of.
+    pub(super) const fn sources(&self) -> Option<&Arc<Sources>> {
+        self.sources.as_ref()
     }
 
     /// When the gateway has started.

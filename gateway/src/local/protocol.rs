@@ -14,6 +14,7 @@ use std::fmt::Write as _;
 use profile_generic::parameter::{Access, Parameter};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
+use profile_generic::time::DurationNs;
 
 use super::drive::job::{Act, Ask, Listing};
 use crate::config::{AxisKind, LogLevel};
@@ -79,6 +80,10 @@ pub enum Request {
         /// Position of the axis in the configuration, from 0; all axes without it.
         axis: Option<usize>,
     },
+    /// List the first contacts.
+    Contacts,
+    /// Send a file.
+    File(FileRequest),
     /// Read or write a parameter.
     Parameter {
         /// Position of the axis in the configuration, from 0.
@@ -109,12 +114,35 @@ pub enum Request {
     },
 }
 
+/// A file that a client asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileRequest {
+    /// The frames of the last seconds of all sides; all that are kept without a length.
+    Recording(Option<DurationNs>),
+    /// The frames of a first contact.
+    Contact(u64),
+    /// The diagnostics bundle.
+    Bundle,
+}
+
+impl FileRequest {
+    /// The word of the request.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Recording(_) => "record",
+            Self::Contact(_) => "contact",
+            Self::Bundle => "bundle",
+        }
+    }
+}
+
 /// Why a line is not a request.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BadRequest {
     /// The first word is none of the protocol's.
     #[error(
-        "unknown word `{0}`: expected box, axes, status, log, faults, enable, disable, stop, reset, jog, move, home, parameters, list, read, write or command"
+        "unknown word `{0}`: expected box, axes, status, log, faults, contacts, contact, record, bundle, enable, disable, stop, reset, jog, move, home, parameters, list, read, write or command"
     )]
     Word(String),
     /// The word needs an axis.
@@ -215,6 +243,10 @@ pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Resu
                 axis: name.map(|name| axis("faults", &mut std::iter::once(name), axes)).transpose()?,
             }
         }
+        "contacts" => Request::Contacts,
+        "contact" => Request::File(FileRequest::Contact(contact_query(&mut words)?)),
+        "record" => Request::File(FileRequest::Recording(recording_query(&mut words)?)),
+        "bundle" => Request::File(FileRequest::Bundle),
         "read" => access("read", &mut words, axes, parameters)?,
         "write" => match direct_write(line, axes)? {
             Some(request) => return Ok(request),
@@ -235,10 +267,8 @@ pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Resu
             Request::Order { axis, order: order(word, &mut words)? }
         }
     };
-    match words.next() {
-        None => Ok(request),
-        Some(text) => Err(BadRequest::Unexpected { text: text.to_owned(), expected: "the end of the line" }),
-    }
+    end(&mut words)?;
+    Ok(request)
 }
 
 /// The axis whose faults are wanted, as a program asks for it over HTTP.
@@ -287,6 +317,37 @@ pub(crate) fn after_query(words: &[&str]) -> Result<u64, BadRequest> {
         after = value.parse().map_err(|_| BadRequest::Whole(value.to_owned()))?;
     }
     Ok(after)
+}
+
+/// How much of the recording is wanted: `last=SECONDS`, or nothing.
+pub(crate) fn recording_query<'a>(
+    words: &mut impl Iterator<Item = &'a str>,
+) -> Result<Option<DurationNs>, BadRequest> {
+    let Some(text) = words.next() else { return Ok(None) };
+    let seconds: Option<u32> = text.strip_prefix("last=").and_then(|value| value.parse().ok());
+    let seconds = seconds.filter(|seconds| *seconds > 0);
+    let expected = "last=SECONDS, a whole number from 1";
+    let seconds = seconds.ok_or_else(|| BadRequest::Unexpected { text: text.to_owned(), expected })?;
+    end(words)?;
+    Ok(Some(DurationNs::from_secs(seconds.into())))
+}
+
+/// Which contact is wanted: `number=N`.
+pub(crate) fn contact_query<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<u64, BadRequest> {
+    let missing = BadRequest::Missing { word: "contact", what: "number=N" };
+    let text = words.next().ok_or(missing)?;
+    let number = text.strip_prefix("number=").and_then(|value| value.parse().ok());
+    let number =
+        number.ok_or_else(|| BadRequest::Unexpected { text: text.to_owned(), expected: "number=N" })?;
+    end(words)?;
+    Ok(number)
+}
+
+/// Nothing may follow.
+fn end<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<(), BadRequest> {
+    words.next().map_or(Ok(()), |text| {
+        Err(BadRequest::Unexpected { text: text.to_owned(), expected: "the end of the line" })
+    })
 }
 
 /// Which lines of the log are wanted, at most so many.
@@ -668,6 +729,25 @@ mod tests {
         assert_eq!(parse("axes", &axes), Ok(Request::Axes));
         assert_eq!(parse("  status\ty-2 ", &axes), Ok(Request::Status { axis: 1 }));
         assert_eq!(parse("parameters", &axes), Ok(Request::Parameters));
+        assert_eq!(parse("contacts", &axes), Ok(Request::Contacts));
+        for (line, wanted) in [
+            ("record", FileRequest::Recording(None)),
+            ("record last=30", FileRequest::Recording(Some(DurationNs::from_secs(30)))),
+            ("contact number=7", FileRequest::Contact(7)),
+            ("bundle", FileRequest::Bundle),
+        ] {
+            assert_eq!(parse(line, &axes), Ok(Request::File(wanted)));
+            assert!(line.starts_with(wanted.word()));
+        }
+        for (line, said) in [
+            ("record last=0", "unexpected `last=0`: expected last=SECONDS, a whole number from 1"),
+            ("record last=1 x", "unexpected `x`: expected the end of the line"),
+            ("contact", "`contact` needs number=N"),
+            ("contact 7", "unexpected `7`: expected number=N"),
+            ("bundle x", "unexpected `x`: expected the end of the line"),
+        ] {
+            assert_eq!(parse(line, &axes).unwrap_err().to_string(), said);
+        }
         let parameter = |parameter, wanted| Ok(Request::Parameter { axis: 1, parameter, wanted });
         assert_eq!(parse("read y-2 code", &axes), parameter(1, None));
         assert_eq!(parse("write y-2 notch_frequency -5", &axes), parameter(0, Some(-5)));

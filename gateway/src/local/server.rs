@@ -23,7 +23,8 @@ use tracing::{info, warn};
 use super::drive::job::{Ask, Context, Job, Step};
 use super::installation::Installation;
 use super::overview::Overview;
-use super::protocol::{self, BadRequest, LINE_MAX, NamedParameter};
+use super::protocol::{self, BadRequest, FileRequest, LINE_MAX, NamedParameter};
+use crate::bundle::Sources;
 use crate::config::AxisKind;
 use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
@@ -46,6 +47,9 @@ const WAITING_MAX: usize = CLIENTS_MAX * PENDING_MAX;
 
 /// How long a client may leave a reply unread.
 const WRITE_TIME_OUT: Duration = Duration::from_secs(1);
+
+/// Bytes of a file that a client has to take within [`WRITE_TIME_OUT`].
+const PART: usize = 64 * 1_024;
 
 /// How often the queues of the engine are looked at.
 const HUB_INTERVAL: Duration = Duration::from_millis(2);
@@ -71,6 +75,8 @@ pub struct Shared {
     pub histories: Histories,
     /// How many lines clients can have written into the log.
     pub limit: Arc<LineLimit>,
+    /// What recordings and bundles are made of.
+    pub sources: Arc<Sources>,
 }
 
 impl Shared {
@@ -107,6 +113,18 @@ impl Shared {
             let _ = writeln!(text, "fault {}", serde_json::to_string(record).unwrap_or_default());
         }
         let _ = writeln!(text, "ok faults {}", records.len());
+        text
+    }
+
+    /// The first contacts, newest first, each as an object.
+    fn contacts(&self) -> String {
+        let recording = self.sources.recording.as_ref();
+        let contacts = recording.map(|recording| recording.contacts()).unwrap_or_default();
+        let mut text = String::new();
+        for contact in &contacts {
+            let _ = writeln!(text, "contact {}", serde_json::to_string(contact).unwrap_or_default());
+        }
+        let _ = writeln!(text, "ok contacts {}", contacts.len());
         text
     }
 
@@ -325,7 +343,16 @@ impl Client {
                     for byte in &buffer[..len] {
                         let Some(line) = lines.push(*byte) else { continue };
                         last = last.wrapping_add(1);
-                        match self.request(last, &line, pending.len()) {
+                        let request = match self.parse(&line) {
+                            Ok(protocol::Request::File(wanted)) => {
+                                write(stream, std::mem::take(&mut replies).as_bytes()).await?;
+                                self.send_file(stream, wanted).await?;
+                                continue;
+                            }
+                            Ok(request) => self.request(last, request, &line, pending.len()),
+                            Err(reply) => Err(reply),
+                        };
+                        match request {
                             Ok((accepted, request)) => {
                                 pending.insert(last, accepted);
                                 if self.to_hub.send(request).await.is_err() {
@@ -357,22 +384,45 @@ impl Client {
                     }
                 }
             };
-            let written = tokio::time::timeout(WRITE_TIME_OUT, stream.write_all(reply.as_bytes())).await;
-            written.map_err(|_| unread())??;
+            write(stream, reply.as_bytes()).await?;
         }
     }
 
-    /// What a line asks the engine for, under the number `id`; or the reply to it.
+    /// What a line asks for; or the reply to it.
+    fn parse(&self, line: &Result<String, BadRequest>) -> Result<protocol::Request, String> {
+        let line = line.as_ref().map_err(|error| protocol::bad("-", error))?;
+        let Shared { names, parameters, .. } = &*self.shared;
+        protocol::parse(line, names, parameters).map_err(|error| protocol::bad(line, &error))
+    }
+
+    /// Makes a file and sends it: a line with its length, then its bytes.
+    async fn send_file(&self, stream: &mut UnixStream, wanted: FileRequest) -> io::Result<()> {
+        let sources = Arc::clone(&self.shared.sources);
+        // It takes tens of milliseconds, and waits for the disk.
+        let made = tokio::task::spawn_blocking(move || make(&sources, wanted)).await?;
+        let word = wanted.word();
+        match made {
+            Ok(file) => {
+                write(stream, format!("ok {word} bytes={}\n", file.len()).as_bytes()).await?;
+                for part in file.chunks(PART) {
+                    write(stream, part).await?;
+                }
+                Ok(())
+            }
+            Err(text) => write(stream, format!("error {word} - recording: {text}\n").as_bytes()).await,
+        }
+    }
+
+    /// What a request asks the engine for, under the number `id`; or the reply to it.
     fn request(
         &self,
         id: u32,
+        request: protocol::Request,
         line: &Result<String, BadRequest>,
         pending: usize,
     ) -> Result<(Accepted, ToHub), String> {
-        let line = line.as_ref().map_err(|error| protocol::bad("-", error))?;
+        let line = line.as_ref().map_or("-", String::as_str);
         let Shared { names, parameters, .. } = &*self.shared;
-        let request =
-            protocol::parse(line, names, parameters).map_err(|error| protocol::bad(line, &error))?;
         let number = |axis: usize| u8::try_from(axis).unwrap_or(u8::MAX);
         let client = self.id;
         match request {
@@ -384,6 +434,9 @@ impl Client {
             protocol::Request::Parameters => Err(protocol::parameter_list(parameters)),
             protocol::Request::Log(query) => Err(self.shared.log(&query)),
             protocol::Request::Faults { axis } => Err(self.shared.faults(axis)),
+            protocol::Request::Contacts => Err(self.shared.contacts()),
+            // Its reply is not a text: see `send_file`.
+            protocol::Request::File(_) => Err(String::new()),
             _ if pending >= PENDING_MAX => Err(protocol::bad(line, &BadRequest::TooMany)),
             protocol::Request::Order { axis, order } => {
                 let request = Request::Order { client, id, axis: number(axis), order };
@@ -462,6 +515,29 @@ impl Client {
             (Err(failure), _) => protocol::failed(word, name, failure),
         }
     }
+}
+
+/// Makes a file; otherwise why there is none.
+fn make(sources: &Sources, wanted: FileRequest) -> Result<Vec<u8>, String> {
+    let recording = || {
+        let off = "nothing is recorded: `[recording]` has `seconds = 0`";
+        sources.recording.as_ref().ok_or_else(|| off.to_owned())
+    };
+    let made = match wanted {
+        FileRequest::Recording(last) => {
+            let recording = recording()?;
+            recording.take(last.unwrap_or_else(|| recording.span()))
+        }
+        FileRequest::Contact(number) => recording()?.take_contact(number),
+        FileRequest::Bundle => sources.bundle(),
+    };
+    made.map_err(|error| error.to_string())
+}
+
+/// Writes to a client that reads.
+async fn write(stream: &mut UnixStream, bytes: &[u8]) -> io::Result<()> {
+    let written = tokio::time::timeout(WRITE_TIME_OUT, stream.write_all(bytes)).await;
+    written.map_err(|_| unread())?
 }
 
 fn unread() -> io::Error {
@@ -595,6 +671,7 @@ mod tests {
             time: TimeView::of(TimeStatus::ptp(&follower)),
             histories: Histories::default(),
             limit: Arc::default(),
+            sources: crate::bundle::tests::sources(),
         }
     }
 
@@ -728,6 +805,27 @@ mod tests {
         assert_eq!((overview.name.as_str(), axes), ("cell", vec![("x", "rev"), ("y", "mm")]));
         assert_eq!((overview.time.source.as_str(), overview.time.synchronized), ("ptp", false));
         assert_eq!(overview.cycles.phase_error_ns, -789);
+    }
+
+    #[tokio::test]
+    async fn files_are_sent_with_their_length_between_other_replies() {
+        let bench = Bench::start("files");
+        let mut client = bench.connect().await;
+        say(&mut client, "contacts\nrecord last=5\ncontact number=3\nbundle\naxes\n").await;
+        assert_eq!(hear(&mut client).await, "ok contacts 0\n");
+        let file = async |client: &mut BufReader<UnixStream>, word: &str| {
+            let head = hear(client).await;
+            let length = head.strip_prefix(&format!("ok {word} bytes=")).expect(&head).trim_end();
+            let mut bytes = vec![0; length.parse().unwrap()];
+            client.read_exact(&mut bytes).await.unwrap();
+            bytes
+        };
+        let recording = file(&mut client, "record").await;
+        assert_eq!(recording[..4], [0x0A, 0x0D, 0x0D, 0x0A]);
+        assert_eq!(hear(&mut client).await, "error contact - recording: there is no contact 3\n");
+        let bundle = file(&mut client, "bundle").await;
+        assert!(bundle.starts_with(b"axisbridge-bundle/recording.pcapng\0"));
+        assert!(hear(&mut client).await.starts_with("axis x state="));
     }
 
     #[tokio::test]

@@ -28,6 +28,7 @@ use profile_cip::device::identity::{Health, ModuleState};
 use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
 use tracing::{info, warn};
 
 use self::can_watch::CanWatch;
@@ -36,9 +37,10 @@ use self::indicators::{Change, Shown};
 use self::port::{CanSocketPort, OpenPort, PacketPort, PortError, UdpPort};
 use self::scribe::Scribe;
 use self::strangers::DropWatch;
+use crate::bundle::{Files, Sources};
 use crate::capture::can_bus::CanProtocol;
-use crate::capture::recorder::{Recorder, Settings, Tap};
-use crate::config::{AxisKind, CanLink, Config, Http, Link, ModbusParameter};
+use crate::capture::recorder::{Interfaces, Recorder, Settings, Tap};
+use crate::config::{AxisKind, CanLink, Config, Device, Http, Link, ModbusParameter, RollingRecording};
 use crate::engine::Engine;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
@@ -48,7 +50,7 @@ use crate::engine::port::CanPort;
 use crate::engine::registers::RegisterNorth;
 use crate::history::Histories;
 use crate::host::HostPort;
-use crate::http::{Files, Fixed, HttpServer, RunningServer, Sheets, View, without_comments};
+use crate::http::{self, Fixed, HttpServer, RunningServer, Sheets, View};
 use crate::latest::Reader;
 use crate::line_limit::LineLimit;
 use crate::local::installation::Installation;
@@ -58,6 +60,7 @@ use crate::mapping::Mapping;
 use crate::modbus::{Binding, ModbusServer, Parameters};
 use crate::north::{self, ExplicitServer, ServeError};
 use crate::parameter::known::Catalogue;
+use crate::recording::{self, ContactDevice, Plan, Recording};
 use crate::settings::Store;
 use crate::simulate::can_bus::InProcessCan;
 use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
@@ -77,6 +80,9 @@ const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
 
 /// After how many milliseconds a CAN controller that is off the bus starts again by itself.
 const CAN_RESTART_MS: u32 = 100;
+
+/// Records that each tap of a recording to a file can hold: a disk can be slow for a second.
+const CAPTURE_DEPTH: usize = 4_096;
 
 /// Frames that the transmit queue of a CAN interface holds: the RPDOs of a cycle, and more. Linux gives ten.
 const CAN_QUEUE: u32 = 128;
@@ -182,6 +188,8 @@ pub struct RunningBox {
     http: Option<RunningServer>,
     /// What has happened.
     histories: Histories,
+    /// The rolling recording.
+    recording: Option<Arc<Recording>>,
     /// The socket of local control, removed at the end.
     _socket: Option<SocketFile>,
 }
@@ -202,10 +210,10 @@ pub struct Extras<'a> {
     pub capture: Option<&'a Path>,
     /// Offers local control on this Unix socket.
     pub local: Option<&'a Path>,
-    /// The text of the configuration, for the page; without it none can be downloaded.
-    pub configuration: Option<&'a str>,
     /// What has happened so far; without it the histories begin here, and the log is not among them.
     pub histories: Option<&'a Histories>,
+    /// The files of the configuration, for the page and the diagnostics bundle.
+    pub files: Option<&'a Files>,
 }
 
 /// Starts a box with these tables; `settings` has what controllers set.
@@ -223,9 +231,10 @@ pub fn start(
         Some(Link::InProcess { .. }) | None => None,
     };
     let mac = wire.as_ref().map_or(SIMULATED_MAC, PacketPort::mac);
+    let recording = rolling(config, &mapping);
     let Built { mut engine, mut adapters, notices, status, commissioners } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
-    let (recorder, mut taps) = record(config, extras.capture)?;
+    let (recorder, mut taps) = record(config, extras.capture, recording.as_ref())?;
     let mut tap = || taps.pop();
     let mut south = Vec::with_capacity(engine.buses().len());
     if let Some(sercos) = &config.sercos {
@@ -294,6 +303,7 @@ pub fn start(
             .map_err(|error| StartError::Adapter { name: device.name.clone(), error })?;
         adapter.hide_connection_ids(secret());
         let (source, asked) = (status.clone(), Arc::clone(&restart));
+        let observer = recording.clone();
         let (kept, keeper, name) = (Arc::clone(settings), Arc::clone(settings), device.name.clone());
         let (clock, clock_source, setter) = (time.view(), config.time.source, time.setter());
         let address = SocketAddrV4::new(device.listen, PORT_IO);
@@ -327,6 +337,9 @@ pub fn start(
                 }
             })
             .on_event(move |event| {
+                if let Some(recording) = &observer {
+                    recording.note_event(number, event);
+                }
                 if let Err(error) = keeper.note(&name, event) {
                     warn!(device = name, %error, "the settings cannot be written; they last until Axisbridge ends");
                 }
@@ -354,12 +367,21 @@ pub fn start(
             }
         });
     }
+    let sources = Arc::new(Sources {
+        config: config.clone(),
+        files: extras.files.cloned().unwrap_or_default(),
+        installation: Installation::of(config),
+        status: status.clone(),
+        time: time.view(),
+        histories: histories.clone(),
+        recording: recording.clone(),
+    });
     let http = config
         .http
         .map(|http| {
-            let files = Files { sheets, configuration: extras.configuration.and_then(without_comments) };
+            let files = http::Files { sheets, configuration: sources.files.shown() };
             let fixed = Fixed { sheets: Sheets::of(config, engine.mapping()), files };
-            serve_http(http, config, fixed, &status, &time, &histories, &limit)
+            serve_http(http, &sources, fixed, &limit)
         })
         .transpose()?;
     let socket = extras
@@ -375,12 +397,14 @@ pub fn start(
                 time: time.view(),
                 histories: histories.clone(),
                 limit: Arc::clone(&limit),
+                sources: Arc::clone(&sources),
             };
             serve_local(path, shared, &mut engine, &runtime)
         })
         .transpose()?;
     let stop_notices = Arc::new(AtomicBool::new(false));
-    let scribe = Scribe::new(Installation::of(config), histories.clone(), status.clone(), limit);
+    let scribe = Scribe::new(Installation::of(config), histories.clone(), status.clone(), limit)
+        .with_recording(recording.clone());
     runtime.spawn(scribe.run(notices, Arc::clone(&stop_notices)));
     let devices = config.devices.iter().map(|device| device.name.clone()).collect();
     let axes = config.axes.iter().map(|axis| axis.name.clone()).collect();
@@ -405,6 +429,7 @@ pub fn start(
         time,
         http,
         histories,
+        recording,
         _socket: socket,
     })
 }
@@ -412,19 +437,18 @@ pub fn start(
 /// Lets the HTTP server show the state.
 fn serve_http(
     http: Http,
-    config: &Config,
+    sources: &Arc<Sources>,
     fixed: Fixed,
-    status: &Reader<BoxStatus>,
-    time: &TimeService,
-    histories: &Histories,
     limit: &Arc<LineLimit>,
 ) -> Result<RunningServer, StartError> {
     let failed = |source| StartError::Http { address: http.listen, source };
     let server = HttpServer::bind(http.listen, http.connections_max).map_err(failed)?;
     let server = server.limit_lines(Arc::clone(limit));
     let address = server.local_address().map_err(failed)?;
-    let (names, histories) = (Installation::of(config), histories.clone());
-    let view = View::new(names, status.clone(), time.view(), histories, fixed, WallClock::now());
+    let Sources { installation, status, time, histories, .. } = &**sources;
+    let (names, status, time) = (installation.clone(), status.clone(), time.clone());
+    let view = View::new(names, status, time, histories.clone(), fixed, WallClock::now())
+        .with_sources(Arc::clone(sources));
     let running =
         server.start(view).map_err(|source| StartError::Thread { what: "the HTTP server", source })?;
     info!(%address, "HTTP");
@@ -536,12 +560,34 @@ fn health(status: &BoxStatus, device: usize) -> Health {
     }
 }
 
-fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, Vec<Tap>), StartError> {
-    let Some(path) = capture else { return Ok((None, Vec::new())) };
-    let mut settings = Settings::new(path);
-    settings.north =
-        config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
-    settings.south = match config.sercos.as_ref().map(|sercos| &sercos.link) {
+/// Starts the recorder thread, where there is something to record, with a tap for each place where traffic is seen.
+fn record(
+    config: &Config,
+    capture: Option<&Path>,
+    recording: Option<&Arc<Recording>>,
+) -> Result<(Option<Recorder>, Vec<Tap>), StartError> {
+    if capture.is_none() && recording.is_none() {
+        return Ok((None, Vec::new()));
+    }
+    let file = capture.map(|path| Settings { interfaces: interfaces(config), ..Settings::new(path) });
+    // The buses, and for each device its I/O and its explicit side.
+    let buses = usize::from(config.sercos.is_some()) + config.can.len() + config.devicenet.len();
+    let taps = buses + 2 * config.devices.len();
+    let depth = if file.is_some() { CAPTURE_DEPTH } else { recording::depth(taps) };
+    let (recorder, taps) =
+        Recorder::start_with(file, recording.map(Recording::sink), depth, taps).map_err(|source| {
+            match capture {
+                Some(path) => StartError::Recording { path: path.display().to_string(), source },
+                None => StartError::Thread { what: "the recorder", source },
+            }
+        })?;
+    Ok((Some(recorder), taps))
+}
+
+/// The interfaces of a recording.
+fn interfaces(config: &Config) -> Interfaces {
+    let north = config.devices.iter().map(|device| device.listen.to_string()).collect::<Vec<_>>().join(", ");
+    let south = match config.sercos.as_ref().map(|sercos| &sercos.link) {
         Some(Link::Interface { name, ring }) => {
             [name.clone(), ring.as_deref().unwrap_or("not used").to_owned()]
         }
@@ -553,13 +599,25 @@ fn record(config: &Config, capture: Option<&Path>) -> Result<(Option<Recorder>, 
     };
     let can = config.can.iter().map(|bus| CanProtocol::Canopen.describe(&bus.link));
     let devicenet = config.devicenet.iter().map(|network| CanProtocol::Devicenet.describe(&network.link));
-    settings.can = can.chain(devicenet).collect();
-    settings.depth = 4096;
-    // The buses, and for each device its I/O and its explicit side.
-    let buses = usize::from(config.sercos.is_some()) + config.can.len() + config.devicenet.len();
-    let (recorder, taps) = Recorder::start(settings, buses + 2 * config.devices.len())
-        .map_err(|source| StartError::Recording { path: path.display().to_string(), source })?;
-    Ok((Some(recorder), taps))
+    Interfaces { north, south, can: can.chain(devicenet).collect() }
+}
+
+/// The rolling recording of a configuration.
+fn rolling(config: &Config, mapping: &Mapping) -> Option<Arc<Recording>> {
+    let RollingRecording { seconds, memory } = config.recording?;
+    let named = |device: &Device| ContactDevice { name: device.name.clone(), address: device.listen };
+    let attributes = mapping.dictionaries.cip.attributes().iter();
+    let attributes = attributes.map(|row| (row.id, row.name.clone())).collect();
+    Some(Recording::new(Plan {
+        span: DurationNs::from_secs(seconds.into()),
+        memory,
+        interfaces: interfaces(config),
+        devices: config.devices.iter().map(named).collect(),
+        axes: config.axes.iter().map(|axis| (axis.name.clone(), axis.device)).collect(),
+        attributes: Arc::new(attributes),
+        buses: Installation::of(config).buses.into_iter().map(|bus| bus.name).collect(),
+        directory: config.history_dir.clone(),
+    }))
 }
 
 /// Differs from start to start.
@@ -668,6 +726,9 @@ impl RunningBox {
         drop(self.http);
         self.runtime.shutdown_timeout(Duration::from_secs(1));
         self.histories.faults.close();
+        if let Some(recording) = self.recording {
+            recording.close();
+        }
         let summary = self.recorder.map(Recorder::finish).transpose()?;
         Ok(Stopped { dropped: summary.map(|summary| summary.dropped), unrested })
     }

@@ -14,6 +14,7 @@ use crate::history::Histories;
 use crate::latest::Reader;
 use crate::line_limit::{LineKind, LineLimit, Peer};
 use crate::local::installation::Installation;
+use crate::recording::Recording;
 use crate::status::BoxStatus;
 use crate::sys::clock::monotonic_now;
 
@@ -31,6 +32,7 @@ pub(super) struct Scribe {
     histories: Histories,
     status: Reader<BoxStatus>,
     limit: Arc<LineLimit>,
+    recording: Option<Arc<Recording>>,
 }
 
 impl Scribe {
@@ -41,7 +43,13 @@ impl Scribe {
         limit: Arc<LineLimit>,
     ) -> Self {
         let axes = names.axes.iter().map(|axis| axis.name.clone()).collect();
-        Self { names, axes, histories, status, limit }
+        Self { names, axes, histories, status, limit, recording: None }
+    }
+
+    /// The same, which shows a recording what happens.
+    #[must_use]
+    pub fn with_recording(self, recording: Option<Arc<Recording>>) -> Self {
+        Self { recording, ..self }
     }
 
     /// Takes notices until the cycle thread has ended.
@@ -49,13 +57,18 @@ impl Scribe {
         let mut interval = tokio::time::interval(NOTICE_INTERVAL);
         let mut began = tokio::time::Instant::now();
         let mut saving: Option<JoinHandle<()>> = None;
+        let mut recording_saves: Option<JoinHandle<()>> = None;
         loop {
             interval.tick().await;
             let last = stop.load(Ordering::Relaxed);
             while let Ok(notice) = notices.pop() {
                 self.take(monotonic_now(), &notice);
             }
-            self.histories.faults.look(&self.status.read());
+            let status = self.status.read();
+            self.histories.faults.look(&status);
+            if let Some(recording) = &self.recording {
+                recording.look(&status);
+            }
             if last {
                 self.limit.report(monotonic_now() + LONG, &self.axes);
                 return;
@@ -68,12 +81,22 @@ impl Scribe {
                 // It waits for the disk; notices do not.
                 saving = Some(tokio::task::spawn_blocking(move || faults.save()));
             }
+            let idle = recording_saves.as_ref().is_none_or(JoinHandle::is_finished);
+            if let Some(recording) =
+                self.recording.as_ref().filter(|recording| idle && recording.is_unsaved())
+            {
+                let recording = Arc::clone(recording);
+                recording_saves = Some(tokio::task::spawn_blocking(move || recording.save()));
+            }
         }
     }
 
     /// Writes a notice down.
     fn take(&self, now: MonotonicTime, notice: &Notice) {
         self.histories.faults.note(notice, &self.names);
+        if let Some(recording) = &self.recording {
+            recording.note(notice);
+        }
         if limited(notice).is_none_or(|(kind, peer)| self.limit.admits(now, kind, peer)) {
             self.log(notice);
         }

@@ -23,6 +23,7 @@ use self::clocks::Clocks;
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
 use super::{CliError, DemoArguments, signal};
+use crate::bundle::Files;
 use crate::config::Config;
 use crate::mapping::Mapping;
 use crate::runner::{self, RunningBox, StartError};
@@ -79,12 +80,13 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     let counts: Vec<_> = config.axes.iter().map(|axis| f64::from(axis.motion_resolution)).collect();
 
     let settings = Arc::new(Store::open(None)?);
+    let files = Files { configuration: text, findings: String::new() };
     let start = || {
         let extras = runner::Extras {
             capture: Some(&arguments.capture),
             local: None,
-            configuration: Some(&text),
             histories: None,
+            files: Some(&files),
         };
         runner::start(&config, mapping.clone(), extras, &settings).map_err(|error| in_use(error, listen))
     };

@@ -15,6 +15,7 @@ pub(super) mod modbus;
 pub(in crate::config) mod nameplate;
 mod problems;
 mod realtime;
+mod recording;
 mod references;
 pub(super) mod sercos;
 pub(super) mod startup;
@@ -50,6 +51,7 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
     let log_level = log_level(problems, file);
     let modbus = value::optional(&file.modbus, |table| modbus::check(problems, table, &file.axis));
     let http = value::optional(&file.http, |table| http::check(problems, table, file.modbus.as_ref()));
+    let recording = recording::check(problems, file.recording.as_ref());
     let mappings = file.mappings.as_ref();
     let paths = mappings.iter().flat_map(|table| table.dir.iter().chain(&table.overlays));
     for path in paths {
@@ -112,6 +114,7 @@ fn check_file(problems: &mut Problems, file: &File) -> Option<Config> {
         log_level: log_level?,
         modbus: modbus?,
         http: http?,
+        recording: recording?,
         mappings_dir,
         overlays,
         settings_file,

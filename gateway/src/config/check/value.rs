@@ -7,7 +7,7 @@ use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::time::DurationNs;
 
 use super::Problems;
-use crate::config::duration;
+use crate::config::{duration, size};
 use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned, closest};
 
@@ -62,6 +62,30 @@ pub(super) fn time_span(problems: &mut Problems, text: &Spanned<String>) -> Opti
             text.span(),
             format_args!("`{}` is not a time", text.get_ref()),
             format_args!("expected {}", duration::EXPECTED),
+        ),
+    }
+}
+
+/// A number of bytes in a range.
+pub(super) fn size(
+    problems: &mut Problems,
+    text: &Spanned<String>,
+    what: &str,
+    range: RangeInclusive<usize>,
+) -> Option<usize> {
+    let given = text.get_ref();
+    match size::parse(given) {
+        None => problems.report(
+            text.span(),
+            format_args!("`{given}` is not a size"),
+            format_args!("expected {}", size::EXPECTED),
+        ),
+        Some(bytes) if range.contains(&bytes) => Some(bytes),
+        Some(_) => problems.report_as(
+            code::OUT_OF_RANGE,
+            text.span(),
+            format_args!("{what} is `{given}`"),
+            format_args!("expected {} to {}", size::show(*range.start()), size::show(*range.end())),
         ),
     }
 }

@@ -20,7 +20,9 @@ function showDownloads({ status }) {
   for (const { name } of status.devices) {
     file(`/api/v1/eds?device=${name}`, `${name}.eds`, `electronic data sheet of the device ${name}, for the controller’s tool`);
   }
-  file('/api/v1/configuration', 'axisbridge.toml', 'the configuration that runs, without its comments');
+  file('/api/v1/configuration', 'axisbridge.toml', 'the configuration that runs, without comments and secrets');
+  file('/bundle', 'axisbridge-bundle.tar', 'the diagnostics bundle: everything on this list, the recording and the contacts');
+  file('/recording.pcapng', 'recording.pcapng', 'frames of all sides in the last seconds, for Wireshark');
   file('/api/v1/status', 'status.json', 'the state of everything now');
   file('/api/v1/faults', 'faults.json', 'faults that are present, and faults that were');
   file('/api/v1/log?lines=1000', 'log.json', 'the last lines of the log');
