@@ -106,7 +106,7 @@ pub fn openapi() -> Value {
         json!([needed(parameter("device", "The device", json!({ "type": "string" })))]);
     let missing = good("The text of the configuration is not known", text("text/plain"));
     let configuration = path(
-        "The configuration, without its comments",
+        "The configuration, without comments and secrets",
         json!({ "200": good("Its keys and values", text("application/toml")), "404": missing }),
     );
     let status = "The same object as that of `axisbridge status --json`";
