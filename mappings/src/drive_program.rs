@@ -459,7 +459,12 @@ impl DriveProgram {
             Parameter::DRIVE_USE => {
                 self.tells(Signal::TorqueActual) && self.datum(Parameter::DRIVE_THERMAL_TIME).is_some()
             }
-            Parameter::HEARD_TIME => true,
+            Parameter::HEARD_TIME | Parameter::COUNTED_RUN_TIME => true,
+            Parameter::COUNTED_TURNS => self.motor_turns_per_unit().is_some(),
+            Parameter::COUNTED_WORK => {
+                let has_velocity = self.tells(Signal::VelocityActual) || self.derives(Signal::VelocityActual);
+                has_velocity && self.tells(Signal::TorqueActual) && self.motor_turns_per_unit().is_some()
+            }
             _ => false,
         };
         is_kept && self.parameter(parameter).is_none()

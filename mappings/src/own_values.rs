@@ -49,10 +49,13 @@ pub const OF_CONFIGURATION: [Parameter; 42] = [
 ];
 
 /// What else it has: from the configuration of the axis, and from what it sees in every cycle.
-pub const OF_GATEWAY: [Parameter; 5] = [
+pub const OF_GATEWAY: [Parameter; 8] = [
     Parameter::MOTOR_TURNS_PER_UNIT,
     Parameter::POWER_STRUCTURE_AXIS_ID,
     Parameter::MOTOR_USE,
     Parameter::DRIVE_USE,
     Parameter::HEARD_TIME,
+    Parameter::COUNTED_RUN_TIME,
+    Parameter::COUNTED_WORK,
+    Parameter::COUNTED_TURNS,
 ];

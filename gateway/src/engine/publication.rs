@@ -270,6 +270,7 @@ fn of_axis(entry: &mut AxisStatus, axis: &AxisChannel) {
     entry.lost_telegrams = counters.lost_telegrams;
     entry.saturated = counters.saturated;
     entry.faults = counters.faults;
+    entry.totals = axis.totals();
 }
 
 /// The DINT that a position is on the controller's side: it wraps.

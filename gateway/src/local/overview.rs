@@ -19,6 +19,10 @@ pub const FORMAT: u32 = 1;
 /// Nanounits in a unit.
 const NANO: f64 = 1e9;
 
+const NANO_PER_HOUR: f64 = 3_600.0 * NANO;
+
+const MICRO: f64 = 1e6;
+
 /// Millionths of the rated torque in a percent of it.
 const PARTS_PER_PERCENT: f64 = 10_000.0;
 
@@ -199,6 +203,12 @@ pub struct Axis {
     /// Faults that have occurred.
     #[serde(default)]
     pub faults: u32,
+    /// Time in operation, hours; counted over restarts where there is a `[history]`.
+    #[serde(default)]
+    pub run_hours: f64,
+    /// Revolutions of the motor in both directions, counted alike; 0 where its gear is not known.
+    #[serde(default)]
+    pub motor_turns: f64,
 }
 
 impl Overview {
@@ -329,6 +339,8 @@ impl Axis {
             inhibits: lower_case(axis.inhibits.iter_names().map(|(name, _)| name)),
             lost_telegrams: axis.lost_telegrams,
             faults: axis.faults,
+            run_hours: f64_from_i64(axis.totals.run_time.0) / NANO_PER_HOUR,
+            motor_turns: f64_from_i64(axis.totals.motor_turns) / MICRO,
         }
     }
 }

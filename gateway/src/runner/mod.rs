@@ -269,6 +269,9 @@ pub fn start(
     }
 
     let histories = extras.histories.cloned().unwrap_or_default();
+    for (axis, of) in engine.axes_mut().iter_mut().zip(&config.axes) {
+        axis.begin_totals(histories.counters.of(&of.name));
+    }
     let limit = Arc::new(LineLimit::default());
     let (time, feed) = TimeService::start(&config.time, &clock_place(&adapters, &ports))?;
 
@@ -656,6 +659,7 @@ impl RunningBox {
         drop(self.http);
         self.runtime.shutdown_timeout(Duration::from_secs(1));
         self.histories.faults.close();
+        self.histories.counters.save();
         let summary = self.recorder.map(Recorder::finish).transpose()?;
         Ok(Stopped { dropped: summary.map(|summary| summary.dropped), unrested })
     }

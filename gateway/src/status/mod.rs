@@ -24,7 +24,7 @@ pub use self::wait::AxisWait;
 use self::bus::BUS_WORDS;
 use self::wait::WAIT_WORDS;
 use crate::config::AXES_MAX;
-use crate::engine::axis::Owner;
+use crate::engine::axis::{Owner, Totals};
 use crate::engine::phase_lock::{LockState, Phase};
 use crate::latest::Words;
 
@@ -32,7 +32,7 @@ use crate::latest::Words;
 const OWNERS: [Owner; 3] = [Owner::Nobody, Owner::Controller, Owner::Local];
 
 /// Words of one axis in the published form.
-const AXIS_WORDS: usize = 12 + WAIT_WORDS;
+const AXIS_WORDS: usize = 15 + WAIT_WORDS;
 
 /// Words of the box itself.
 const BOX_WORDS: usize = 10;
@@ -122,6 +122,8 @@ pub struct AxisStatus {
     pub saturated: u32,
     /// Faults raised since the start.
     pub faults: u32,
+    /// What the axis has done in its life.
+    pub totals: Totals,
     /// What the indicators show for the axis and its device.
     pub indicators: Indicators,
     /// The controller that is connected to its device.
@@ -232,6 +234,7 @@ impl AxisStatus {
         lost_telegrams: 0,
         saturated: 0,
         faults: 0,
+        totals: Totals { run_time: DurationNs(0), motor_turns: 0, motor_work: 0 },
         indicators: Indicators::NONE,
         controller: None,
     };
@@ -369,6 +372,9 @@ impl AxisStatus {
             self.commands,
             pair(self.lost_updates, self.lost_telegrams),
             pair(self.saturated, self.faults),
+            self.totals.run_time.0.cast_unsigned(),
+            self.totals.motor_turns.cast_unsigned(),
+            self.totals.motor_work.cast_unsigned(),
             self.indicators.to_word(),
             Controller::to_word(self.controller),
             wait_0,
@@ -389,6 +395,9 @@ impl AxisStatus {
             commands,
             lost,
             other,
+            run_time,
+            motor_turns,
+            motor_work,
             indicators,
             controller,
             wait @ ..,
@@ -423,6 +432,11 @@ impl AxisStatus {
             lost_telegrams,
             saturated,
             faults,
+            totals: Totals {
+                run_time: DurationNs(run_time.cast_signed()),
+                motor_turns: motor_turns.cast_signed(),
+                motor_work: motor_work.cast_signed(),
+            },
             indicators: Indicators::from_word(indicators),
             controller: Controller::from_word(controller),
         }
@@ -581,6 +595,11 @@ pub(crate) mod tests {
             lost_telegrams: 0x7777_8888,
             saturated: 0x0999_0AAA,
             faults: 0x0BBB_0CCC,
+            totals: Totals {
+                run_time: DurationNs(3_600_000_000_017),
+                motor_turns: 12_345_678_901_234,
+                motor_work: -55_555,
+            },
             indicators: Indicators {
                 module: ModuleState::MajorRecoverableFault,
                 network: Indication::SOLID_GREEN,

@@ -26,6 +26,7 @@
 //! | [`hookup`], [`capture`], [`procedure`] | tests, captured positions, procedures that the drive carries out |
 
 pub mod capture;
+mod counters;
 mod cycle;
 mod diagnosis;
 mod diagnostic_message;
@@ -57,6 +58,7 @@ mod user_limits;
 mod velocimeter;
 mod waiting;
 
+pub use self::counters::Totals;
 pub use self::diagnostic_message::DiagnosticMessage;
 pub use self::feed_forward::FeedForward;
 pub use self::guard::Trip;
@@ -89,6 +91,7 @@ use crate::engine::access::{Access, AccessFailure, Progress};
 use crate::mapping::Item;
 
 use self::capture::{CaptureAccess, CaptureUnit};
+use self::counters::Counters;
 use self::diagnosis::{Diagnosis, Shows};
 use self::faults::Faults;
 use self::hookup::HookupUnit;
@@ -195,6 +198,8 @@ pub struct AxisChannel {
     slow: slow_values::SlowValues,
     /// How warm it is by its load.
     heats: heat::Heats,
+    /// What it has done in its life.
+    totals: Counters,
 }
 
 /// The generic state machine.
@@ -232,6 +237,7 @@ impl AxisChannel {
             data: Vec::new(),
             slow: slow_values::SlowValues::default(),
             heats: heat::Heats::default(),
+            totals: Counters::default(),
         }
     }
 
@@ -318,6 +324,9 @@ impl AxisChannel {
             Parameter::MOTOR_USE => Some(self.heats.motor.millionths()),
             Parameter::DRIVE_USE => Some(self.heats.drive.millionths()),
             Parameter::HEARD_TIME => Some(self.supervision.heard_for().0),
+            Parameter::COUNTED_RUN_TIME => Some(self.totals().run_time.0),
+            Parameter::COUNTED_WORK => Some(self.totals().motor_work),
+            Parameter::COUNTED_TURNS => Some(self.totals().motor_turns),
             _ => None,
         }
     }
@@ -347,6 +356,17 @@ impl AxisChannel {
             saturated: self.set_points.saturated.saturating_add(self.link.saturated),
             faults: self.faults.count(),
         }
+    }
+
+    /// What it has done in its life, as far as gateways have counted it.
+    #[must_use]
+    pub fn totals(&self) -> Totals {
+        self.totals.totals()
+    }
+
+    /// Sets what was counted before; to be called before the first cycle.
+    pub fn begin_totals(&mut self, totals: Totals) {
+        self.totals.begin_with(totals);
     }
 
     /// What the axis waits for; `None` when it does what it was told, or has nothing to do.
@@ -630,5 +650,6 @@ impl AxisChannel {
     fn restart_position(&mut self) {
         self.link.restart_position();
         self.supervision.restart_plausibility();
+        self.totals.restart_position();
     }
 }
