@@ -13,12 +13,8 @@ use crate::local::installation::Installation;
 use crate::status::BoxStatus;
 
 /// Its file.
-pub(super) const KIND: Kind = Kind {
-    name: "faults.jsonl",
-    title: "fault history",
-    record: "a fault",
-    records_max: RECORDS_MAX,
-};
+pub(super) const KIND: Kind =
+    Kind { name: "faults.jsonl", title: "fault history", record: "a fault", records_max: RECORDS_MAX };
 
 /// The faults of the axes of a gateway, those of earlier runs included where they are kept in a file.
 #[derive(Debug, Default)]

@@ -102,6 +102,10 @@ parameter_rows! {
         "Cycles in a unit of the encoder at the load.";
     LOAD_FEEDBACK_INTERPOLATION = 0x060E, "load_feedback_interpolation", BasicDrive, None, Integer, Write,
         "Counts in a cycle of the encoder at the load.";
+    MOTOR_ENCODER_SHOWN = 0x060F, "motor_encoder_shown", BasicDrive, None, Integer, Read,
+        "1 where the actual position is that of the encoder of the motor.";
+    FEEDBACK_MASTER = 0x0610, "feedback_master", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Encoder that an axis shows which is never switched on: 1 that of the motor, 2 that of the load.";
 
     MOTOR_NAME = 0x0702, "motor_name", BasicDrive, None, Text, Read,
         "Type designation of the motor.";

@@ -724,6 +724,7 @@ pub(super) const ATTRIBUTES: &[(&str, &str)] = &[
     ("Inverter Rated Output Voltage", "drive_rated_voltage"),
     ("Inverter Rated Output Power", "drive_rated_power"),
     ("Drive Power Structure Axis ID", "power_structure_axis_id"),
+    ("Feedback Master Select", "feedback_master"),
     ("Drive Enable Input Checking", "enable_input_checking"),
     ("Motor Type", "motor_type"),
     ("Motor Unit", "motor_unit"),

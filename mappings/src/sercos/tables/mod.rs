@@ -7,6 +7,7 @@ use profile_generic::image::{Signal, StatusBits};
 use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::program::BitPattern;
+use profile_generic::quantity::Quantity;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, Report};
 use profile_sercos::wire::idn::Idn;
@@ -17,6 +18,7 @@ use super::scaling::ScalingRule;
 use crate::dictionary::{Dictionaries, IdnUnit};
 use crate::drive_program::FaultRow;
 use crate::drive_rows::FixedUnit;
+use crate::feedback::FeedbackUse;
 
 #[derive(Debug, Clone)]
 pub(crate) struct SignalRule {
@@ -26,6 +28,8 @@ pub(crate) struct SignalRule {
     pub refuse: bool,
     /// The bit by which the drive inverts it.
     pub polarity: Option<Polarity>,
+    /// The same by the encoder of the load.
+    pub load: Option<(Idn, Option<Polarity>)>,
 }
 
 /// A bit of a polarity parameter.
@@ -41,6 +45,8 @@ pub(crate) struct ModeRule {
     /// Whether an axis can do without it.
     pub optional: bool,
     pub codes: Vec<u16>,
+    /// Those for the encoder of the load; none where it does not matter to the mode.
+    pub load_codes: Vec<u16>,
     pub command: Vec<Signal>,
     pub actual: Vec<Signal>,
 }
@@ -160,6 +166,28 @@ pub struct SercosTables {
 }
 
 impl SercosTables {
+    /// The tables for axes with this use of their encoders.
+    pub(crate) fn for_feedback(&self, feedback: FeedbackUse) -> Self {
+        let mut tables = self.clone();
+        if feedback == FeedbackUse::Motor {
+            return tables;
+        }
+        for mode in tables.modes.iter_mut().filter(|mode| !mode.load_codes.is_empty()) {
+            mode.codes.clone_from(&mode.load_codes);
+        }
+        for rule in &mut tables.signals {
+            let is_of_load = feedback == FeedbackUse::Load || rule.signal.quantity() == Quantity::Position;
+            if let Some((idn, polarity)) = rule.load.filter(|_| is_of_load) {
+                (rule.idn, rule.polarity) = (idn, polarity);
+                if rule.signal == Signal::PositionActual {
+                    // The axis goes the way of its actual position.
+                    tables.direction = polarity.or(tables.direction);
+                }
+            }
+        }
+        tables
+    }
+
     pub(crate) fn signal(&self, signal: Signal) -> Option<&SignalRule> {
         self.signals.iter().find(|rule| rule.signal == signal)
     }
