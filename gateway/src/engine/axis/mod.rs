@@ -324,6 +324,7 @@ impl AxisChannel {
             Parameter::MOTOR_USE => Some(self.heats.motor.millionths()),
             Parameter::DRIVE_USE => Some(self.heats.drive.millionths()),
             Parameter::HEARD_TIME => Some(self.supervision.heard_for().0),
+            Parameter::MOTOR_ENCODER_SHOWN => Some(1),
             Parameter::COUNTED_RUN_TIME => Some(self.totals().run_time.0),
             Parameter::COUNTED_WORK => Some(self.totals().motor_work),
             Parameter::COUNTED_TURNS => Some(self.totals().motor_turns),

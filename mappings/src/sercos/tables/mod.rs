@@ -7,7 +7,6 @@ use profile_generic::image::{Signal, StatusBits};
 use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::parameter::Parameter;
 use profile_generic::program::BitPattern;
-use profile_generic::quantity::Quantity;
 use profile_generic::scaling::UnitKind;
 use profile_generic::state::{Action, Report};
 use profile_sercos::wire::idn::Idn;
@@ -175,9 +174,12 @@ impl SercosTables {
         for mode in tables.modes.iter_mut().filter(|mode| !mode.load_codes.is_empty()) {
             mode.codes.clone_from(&mode.load_codes);
         }
+        if feedback == FeedbackUse::Load {
+            // That of the motor is not meant, and no source has the unit of the load's: the gateway derives it from positions.
+            tables.modes.iter_mut().for_each(|mode| mode.actual.retain(|of| *of != Signal::VelocityActual));
+        }
         for rule in &mut tables.signals {
-            let is_of_load = feedback == FeedbackUse::Load || rule.signal.quantity() == Quantity::Position;
-            if let Some((idn, polarity)) = rule.load.filter(|_| is_of_load) {
+            if let Some((idn, polarity)) = rule.load {
                 (rule.idn, rule.polarity) = (idn, polarity);
                 if rule.signal == Signal::PositionActual {
                     // The axis goes the way of its actual position.
