@@ -15,9 +15,11 @@ use profile_generic::state::{Action, Report};
 use profile_generic::time::DurationNs;
 use profile_sercos::wire::idn::Idn;
 
+use super::attributes::Number;
 use super::capture_program::{CaptureProgram, Place};
+use super::feedback::FeedbackUse;
 use super::item::Item;
-use super::mechanics::Mechanics;
+use super::mechanics::{MechanicalFact, Mechanics};
 use crate::own_values::OF_CONFIGURATION;
 
 /// Operation modes of one axis: the slots S-0-0032..35 and S-0-0284..287.
@@ -319,6 +321,8 @@ pub struct DriveProgram {
     data: ArrayVec<(Parameter, i64), DATA_MAX>,
     /// What lies between its motor and its load, where that is known.
     pub mechanics: Option<Mechanics>,
+    /// Whose encoder its position and velocity are of.
+    pub encoders: FeedbackUse,
     /// Its loops have a feed-forward of the acceleration of their own.
     pub(super) feeds_forward: bool,
     pub(super) position_step: Option<i64>,
@@ -327,8 +331,9 @@ pub struct DriveProgram {
     pub(super) shares_target: bool,
 }
 
-/// Most values of parameters that a drive does not show: those of the nameplates, and the number of the power stage.
-pub const DATA_MAX: usize = OF_CONFIGURATION.len() + 1;
+/// Most values of parameters that a drive does not show: those of the nameplates, the number of the power stage, and the encoder that an
+/// axis goes by.
+pub const DATA_MAX: usize = OF_CONFIGURATION.len() + 2;
 
 /// A fault or warning in a diagnostic word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -369,6 +374,7 @@ impl DriveProgram {
             parameters: Vec::new(),
             data: ArrayVec::new(),
             mechanics: None,
+            encoders: FeedbackUse::Motor,
             feeds_forward: false,
             position_step: None,
             acknowledges,
@@ -416,10 +422,24 @@ impl DriveProgram {
             Parameter::FEEDBACK_ACCELERATION_FILTER => self.derives(Signal::AccelerationActual),
             Parameter::LOAD_FEEDBACK_UNIT
             | Parameter::LOAD_FEEDBACK_RESOLUTION
-            | Parameter::LOAD_FEEDBACK_INTERPOLATION => {
-                self.parameter(Parameter::LOAD_POSITION_ACTUAL).is_some()
-            }
+            | Parameter::LOAD_FEEDBACK_INTERPOLATION => self.has_load_encoder(),
             _ => true,
+        }
+    }
+
+    /// Whether the drive shows an encoder of the load.
+    fn has_load_encoder(&self) -> bool {
+        self.parameter(Parameter::LOAD_POSITION_ACTUAL).is_some() || self.encoders != FeedbackUse::Motor
+    }
+
+    /// Sets the use of the encoders. A CiA 402 drive whose loop is closed over the encoder of the load shows another one beside it, which
+    /// is not the load's.
+    pub(crate) fn set_encoders(&mut self, feedback: FeedbackUse, only_looks: bool) {
+        self.encoders = feedback;
+        if feedback != FeedbackUse::Motor && !only_looks {
+            const OF_LOAD: [Parameter; 2] =
+                [Parameter::LOAD_POSITION_ACTUAL, Parameter::LOAD_VELOCITY_ACTUAL];
+            self.parameters.retain(|entry| !OF_LOAD.contains(&entry.parameter));
         }
     }
 
@@ -475,7 +495,13 @@ impl DriveProgram {
             Parameter::DRIVE_USE => {
                 self.tells(Signal::TorqueActual) && self.datum(Parameter::DRIVE_THERMAL_TIME).is_some()
             }
-            Parameter::HEARD_TIME => true,
+            Parameter::HEARD_TIME | Parameter::COUNTED_RUN_TIME => true,
+            Parameter::MOTOR_ENCODER_SHOWN => self.encoders == FeedbackUse::Motor,
+            Parameter::COUNTED_TURNS => self.motor_turns_per_unit().is_some(),
+            Parameter::COUNTED_WORK => {
+                let has_velocity = self.tells(Signal::VelocityActual) || self.derives(Signal::VelocityActual);
+                has_velocity && self.tells(Signal::TorqueActual) && self.motor_turns_per_unit().is_some()
+            }
             _ => false,
         };
         is_kept && self.parameter(parameter).is_none()
@@ -491,6 +517,15 @@ impl DriveProgram {
     #[must_use]
     pub fn motor_turns_per_unit(&self) -> Option<i64> {
         self.mechanics.and_then(|mechanics| mechanics.motor_turns_per_unit())
+    }
+
+    /// What the drive has of its mechanics: with it, what an attribute can be set to; `None` where nobody knows, or the axis has no such
+    /// encoder.
+    #[must_use]
+    pub fn mechanical(&self, fact: MechanicalFact) -> Option<(Mechanics, Number)> {
+        let has = fact != MechanicalFact::UnitRatio || self.has_load_encoder();
+        let mechanics = self.mechanics.filter(|_| has)?;
+        Some((mechanics, mechanics.value(fact)?))
     }
 
     /// The values to the drive, each with what carries it.

@@ -29,6 +29,7 @@ mod dictionary;
 mod drive_program;
 mod drive_rows;
 mod examples;
+mod feedback;
 pub mod finding;
 pub mod format;
 mod generic_names;
@@ -95,6 +96,7 @@ pub use drive_program::{
     ParameterEntry, Procedure, ProcedureBy, Telegram,
 };
 pub use drive_rows::Full;
+pub use feedback::FeedbackUse;
 pub use item::{Attribute, Item, Object};
 pub use load::{FORMAT, MAX_FILE_BYTES, Parsed, TableText, TableTexts, Tables};
 pub use mechanics::{MechanicalFact, Mechanics};
@@ -128,8 +130,12 @@ pub struct Mapping {
     pub cip: Arc<CipTables>,
     /// The generic model and SERCOS.
     pub sercos: Arc<SercosTables>,
+    /// The same for axes whose position is that of the load: by its velocity too, and by that of the motor.
+    sercos_of_load: [Arc<SercosTables>; 2],
     /// The generic model and CiA 402.
     pub cia402: Arc<Cia402Tables>,
+    /// The same for axes that only look at the encoder of the load.
+    cia402_of_load: Arc<Cia402Tables>,
     tables: Tables,
     families: Vec<Family>,
 }
@@ -216,13 +222,17 @@ impl Mapping {
     fn join(tables: Tables, dictionaries: Arc<Dictionaries>, sound: bool, findings: &mut Findings) -> Self {
         let cip = CipTables::resolve(&tables.cip_generic, &dictionaries, findings);
         let sercos = SercosTables::resolve(&tables.generic_sercos, &dictionaries, &cip, findings);
+        let of_load = [FeedbackUse::Load, FeedbackUse::Dual].map(|of| Arc::new(sercos.for_feedback(of)));
         // What is wrong with a dictionary need not be told again by every row that names it.
         let cia402 = sound.then(|| Cia402Tables::resolve(&tables.generic_cia402, &dictionaries, findings));
+        let cia402 = cia402.unwrap_or_default();
         Self {
             dictionaries,
             cip: Arc::new(cip),
             sercos: Arc::new(sercos),
-            cia402: Arc::new(cia402.unwrap_or_default()),
+            sercos_of_load: of_load,
+            cia402_of_load: Arc::new(cia402.for_load()),
+            cia402: Arc::new(cia402),
             tables,
             families: Vec::new(),
         }
@@ -231,13 +241,14 @@ impl Mapping {
     /// The same for a family of drives.
     fn family(&self, family: overlay::ParsedFamily, findings: &mut Findings) -> Family {
         let overlay::ParsedFamily { name, vendor, products, table } = family;
-        let cia402 = Arc::new(Cia402Tables::resolve(&table, &self.dictionaries, findings));
+        let cia402 = Cia402Tables::resolve(&table, &self.dictionaries, findings);
+        let (cia402_of_load, cia402) = (Arc::new(cia402.for_load()), Arc::new(cia402));
         let tables = Tables { generic_cia402: table, ..self.tables.clone() };
         Family {
             name,
             vendor,
             products,
-            mapping: Self { cia402, tables, families: Vec::new(), ..self.clone() },
+            mapping: Self { cia402, cia402_of_load, tables, families: Vec::new(), ..self.clone() },
         }
     }
 
@@ -365,12 +376,31 @@ impl Mapping {
         Some(definitions::definitions(self, &self.attribute_table(scaling)?))
     }
 
+    /// The tables for a CiA 402 axis, by the encoder that it goes by.
+    fn cia402_of(&self, axis: &Cia402Axis) -> &Cia402Tables {
+        if axis.only_looks && axis.feedback != FeedbackUse::Motor {
+            &self.cia402_of_load
+        } else {
+            &self.cia402
+        }
+    }
+
+    /// The tables for a SERCOS axis, by the encoders that it goes by.
+    fn sercos_of(&self, axis: &SercosAxis) -> &SercosTables {
+        let [load, dual] = &self.sercos_of_load;
+        match axis.feedback {
+            FeedbackUse::Motor => &self.sercos,
+            FeedbackUse::Load => load,
+            FeedbackUse::Dual => dual,
+        }
+    }
+
     /// What the telegrams of an axis carry, as far as `facts` are known.
     ///
     /// # Errors
     /// A mode has no row, the drive lacks a value that it must have, or a length is not known.
     pub fn telegram(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<Telegram, SercosError> {
-        Telegram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+        Telegram::compile(self.sercos_of(axis), &self.dictionaries.sercos, axis, facts)
     }
 
     /// The connections of a drive of class SCP_FixCFG, as it has said them; `None` of a drive that takes others.
@@ -392,7 +422,7 @@ impl Mapping {
         phase: u8,
         facts: &DriveFacts,
     ) -> Result<CommissioningPlan, SercosError> {
-        CommissioningPlan::compile(&self.sercos, &self.dictionaries.sercos, axis, phase, facts)
+        CommissioningPlan::compile(self.sercos_of(axis), &self.dictionaries.sercos, axis, phase, facts)
     }
 
     /// The program of an axis on the SERCOS side, once its drive has reported its scaling.
@@ -400,13 +430,13 @@ impl Mapping {
     /// # Errors
     /// As [`Mapping::telegram`], and when the scaling was not read or has no row.
     pub fn sercos_program(&self, axis: &SercosAxis, facts: &DriveFacts) -> Result<DriveProgram, SercosError> {
-        DriveProgram::compile(&self.sercos, &self.dictionaries.sercos, axis, facts)
+        DriveProgram::compile(self.sercos_of(axis), &self.dictionaries.sercos, axis, facts)
     }
 
     /// The IDNs that commissioning writes into the drive of an axis, by number.
     #[must_use]
     pub fn sercos_written(&self, axis: &SercosAxis) -> Vec<Idn> {
-        self.sercos.written(axis)
+        self.sercos_of(axis).written(axis)
     }
 
     /// The objects that commissioning writes into the drive of an axis, by number, as they are on the device.
@@ -416,7 +446,7 @@ impl Mapping {
             Item::Object(object) => Some(object),
             Item::Idn(_) | Item::Attribute(_) => None,
         };
-        self.cia402.written(axis).into_iter().filter_map(of_axis).collect()
+        self.cia402_of(axis).written(axis).into_iter().filter_map(of_axis).collect()
     }
 
     /// What is asked of a CiA 402 drive at start, or told to it.
@@ -429,14 +459,14 @@ impl Mapping {
         axis: &Cia402Axis,
         facts: &ObjectFacts,
     ) -> Result<Vec<ObjectStep>, Cia402Error> {
-        self.cia402.steps(plan, axis, facts)
+        self.cia402_of(axis).steps(plan, axis, facts)
     }
 
     /// What has to be tried of a CiA 402 drive that does not report its modes of operation; `None` where it does, or where the
     /// configuration reports them, which is noted.
     #[must_use]
     pub fn cia402_modes_untold(&self, axis: &Cia402Axis, facts: &mut ObjectFacts) -> Option<ModeWords> {
-        self.cia402.modes_untold(axis, facts)
+        self.cia402_of(axis).modes_untold(axis, facts)
     }
 
     /// Operating modes that an axis does without, because its SERCOS drive lacks something, and what.
@@ -446,7 +476,8 @@ impl Mapping {
         axis: &SercosAxis,
         facts: &DriveFacts,
     ) -> Vec<(ModeSelection, SercosError)> {
-        let compiler = Compiler { tables: &self.sercos, dictionary: &self.dictionaries.sercos, axis, facts };
+        let compiler =
+            Compiler { tables: self.sercos_of(axis), dictionary: &self.dictionaries.sercos, axis, facts };
         compiler.modes().map(|modes| modes.left_out).unwrap_or_default()
     }
 
@@ -457,13 +488,13 @@ impl Mapping {
         axis: &Cia402Axis,
         facts: &ObjectFacts,
     ) -> Vec<(ModeSelection, Cia402Error)> {
-        self.cia402.modes_left_out(axis, facts)
+        self.cia402_of(axis).modes_left_out(axis, facts)
     }
 
     /// The time between set-points that a CiA 402 drive expects, where it is another one than the cycle.
     #[must_use]
     pub fn cia402_other_period(&self, axis: &Cia402Axis, facts: &ObjectFacts) -> Option<InterpolationPeriod> {
-        self.cia402.other_period(axis, facts)
+        self.cia402_of(axis).other_period(axis, facts)
     }
 
     /// Notes that a CiA 402 drive has these modes of operation and no others.
@@ -476,7 +507,7 @@ impl Mapping {
     /// # Errors
     /// A mode has no row.
     pub fn cia402_telegram(&self, axis: &Cia402Axis) -> Result<Telegram, Cia402Error> {
-        self.cia402.telegram_room(axis)
+        self.cia402_of(axis).telegram_room(axis)
     }
 
     /// The program of an axis on the CiA 402 side, once its drive was asked.
@@ -488,7 +519,7 @@ impl Mapping {
         axis: &Cia402Axis,
         facts: &ObjectFacts,
     ) -> Result<DriveProgram, Cia402Error> {
-        self.cia402.program(axis, facts)
+        self.cia402_of(axis).program(axis, facts)
     }
 
     /// Runs every worked example of the tables.

@@ -36,6 +36,8 @@ pub enum MechanicalFact {
     Lead,
     /// Diameter of a wheel whose circumference is that travel, millimetre.
     Diameter,
+    /// Revolutions of the encoder of the motor in a revolution or metre of that of the load.
+    UnitRatio,
 }
 
 /// What lies between motor and load.
@@ -68,6 +70,7 @@ impl Mechanics {
             }
             MechanicalFact::Lead => Number::Real(travel),
             MechanicalFact::Diameter => Number::Real(travel / PI),
+            MechanicalFact::UnitRatio => Number::Real(self.feedback_unit_ratio()?),
         })
     }
 
@@ -101,6 +104,15 @@ impl Mechanics {
             UnitKind::Linear => gear.then(self.travel?.inverse()?)?,
         };
         turns.apply(1_000_000_000_000_000, Rounding::Nearest).ok()
+    }
+
+    /// Revolutions of the motor in a revolution of the load, or in a metre; `None` where nobody knows the travel.
+    fn feedback_unit_ratio(&self) -> Option<f64> {
+        let gear = self.gear.map_or(1.0, |gear| gear.to_f64(1));
+        match self.kind {
+            UnitKind::Rotary => Some(gear),
+            UnitKind::Linear => Some(gear / self.travel?.to_f64(1) * 1_000.0),
+        }
     }
 
     /// Whether the load turns as the motor does.
@@ -158,6 +170,18 @@ mod tests {
         assert_eq!(turns(UnitKind::Rotary, Ratio::new(10, 3), None), Some(3_333_333_333_333_333));
         assert_eq!(turns(UnitKind::Linear, Ratio::new(2, 1), Ratio::new(5, 1)), Some(400_000_000_000_000));
         assert_eq!(turns(UnitKind::Linear, None, None), None);
+    }
+
+    #[test]
+    fn unit_ratio_is_turns_of_the_motor_for_a_turn_or_a_metre_of_the_load() {
+        let value = |kind, gear, travel| Mechanics { kind, gear, travel }.value(MechanicalFact::UnitRatio);
+        assert_eq!(value(UnitKind::Rotary, None, None), Some(Number::Real(1.0)));
+        assert_eq!(value(UnitKind::Rotary, Ratio::new(10, 4), None), Some(Number::Real(2.5)));
+        let screw = Mechanics { kind: UnitKind::Linear, gear: Ratio::new(2, 1), travel: Ratio::new(5, 1) };
+        assert_eq!(screw.value(MechanicalFact::UnitRatio), Some(Number::Real(400.0)));
+        assert!(screw.agrees(MechanicalFact::UnitRatio, Number::Real(400.0001)));
+        assert!(!screw.agrees(MechanicalFact::UnitRatio, Number::Real(401.0)));
+        assert_eq!(value(UnitKind::Linear, Ratio::new(2, 1), None), None);
     }
 
     #[test]

@@ -81,7 +81,7 @@ impl Mapping {
     /// As [`Mapping::commissioning`].
     pub fn facts_of_obedient(&self, axis: &SercosAxis) -> Result<DriveFacts, SercosError> {
         let mut facts = DriveFacts::new();
-        let codes = self.sercos.modes.iter().flat_map(|rule| &rule.codes);
+        let codes = self.sercos.modes.iter().flat_map(|rule| rule.codes.iter().chain(&rule.load_codes));
         let listed: Vec<u8> = codes.flat_map(|code| code.to_le_bytes()).collect();
         facts.note_data(self.sercos.supported_modes, &listed);
         let plan = self.commissioning(axis, 2, &facts)?;

@@ -43,7 +43,9 @@ impl Mapping {
         if parameter == Parameter::MOTOR_TURNS_PER_UNIT {
             return "computes it from the scaling of the drive";
         }
-        if parameter == Parameter::POWER_STRUCTURE_AXIS_ID {
+        if [Parameter::POWER_STRUCTURE_AXIS_ID, Parameter::FEEDBACK_MASTER, Parameter::MOTOR_ENCODER_SHOWN]
+            .contains(&parameter)
+        {
             return "has it from the configuration of the axis";
         }
         if OF_GATEWAY.contains(&parameter) {

@@ -95,8 +95,8 @@ impl Mapping {
             Backing::Connection => (Truth::Computed, "the motion connection".to_owned()),
             Backing::Stored => (Truth::Stored, String::new()),
             Backing::Constant(value) => (Truth::Compared, format!("always {value}")),
-            Backing::Mechanics(fact) => match drive.mechanics.and_then(|mechanics| mechanics.value(fact)) {
-                Some(value) => (Truth::Compared, format!("{value} by the scaling of the drive")),
+            Backing::Mechanics(fact) => match drive.mechanical(fact) {
+                Some((_, value)) => (Truth::Compared, format!("{value} by the scaling of the drive")),
                 None => (Truth::Absent, "the drive does not show it".to_owned()),
             },
             Backing::Signal { signal, otherwise: Some(parameter), .. } if !drive.tells(signal) => {

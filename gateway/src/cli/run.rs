@@ -19,7 +19,7 @@ use crate::bundle::Files;
 use crate::check::{Request, check};
 use crate::config::{Config, LogLevel};
 use crate::finding::{Finding, Findings, Severity};
-use crate::history::{EventRing, FaultHistory, Histories, LinesOf, RingLayer};
+use crate::history::{EventRing, Histories, LinesOf, RingLayer};
 use crate::mapping::Mapping;
 use crate::runner;
 use crate::settings::Store;
@@ -32,7 +32,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     let (mut good, findings) = read(&arguments.config).map_err(|findings| refusal(&findings))?;
     let events = Arc::new(EventRing::default());
     log_to_stderr(good.config.log_level, &events);
-    let in_memory = Arc::new(FaultHistory::default());
+    let in_memory = Histories { events: Arc::clone(&events), ..Histories::default() };
     tell(&findings);
     let [stop, hurry] = super::signal::stop_and_hurry_on_signals()?;
     let asked = Asked { stop, hurry, reload: super::signal::reload_on_hang_up()? };
@@ -41,9 +41,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     loop {
         let settings = Arc::new(Store::open(good.config.settings_file.as_deref())?);
         let directory = good.config.history_dir.as_deref();
-        let faults =
-            directory.map_or_else(|| Arc::clone(&in_memory), |path| Arc::new(FaultHistory::open(path)));
-        let histories = Histories { events: Arc::clone(&events), faults };
+        let histories = directory.map_or_else(|| in_memory.clone(), |path| in_memory.kept_in(path));
         match run_once(&good, arguments, &settings, &histories, &asked, &manager)? {
             After::End { rested: true } => return Ok(ExitCode::SUCCESS),
             After::End { rested: false } => return Ok(ExitCode::FAILURE),

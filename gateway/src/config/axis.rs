@@ -3,7 +3,7 @@
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 
-use crate::mapping::CaptureMode;
+use crate::mapping::{CaptureMode, FeedbackUse};
 
 /// Whether an axis turns or slides, and with it the unit of its quantities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +55,8 @@ pub struct Axis {
     pub function: AxisFunction,
     /// Rotary or linear.
     pub kind: AxisKind,
+    /// Whose encoder its position and velocity are of.
+    pub feedback: FeedbackUse,
     /// Position counts of the controller for one axis unit.
     pub motion_resolution: u32,
     /// Position counts after which the axis is at its start again; `None` for an axis with ends.

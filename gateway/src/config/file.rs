@@ -104,7 +104,8 @@ pub struct LogTable {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HistoryTable {
-    /// Directory in which the history of faults is kept, relative to the folder of this file. It is made if it is not there.
+    /// Directory in which the history of faults and the counters of the axes are kept, relative to the folder of this file. It is made if it
+    /// is not there.
     #[schemars(transform = form::path)]
     pub directory: Spanned<String>,
 }
@@ -288,6 +289,10 @@ pub struct AxisTable {
     /// `"revolution"` for a rotary axis, `"millimetre"` for a linear one.
     #[schemars(transform = form::word(&check::axis::UNITS))]
     pub unit: Spanned<String>,
+    /// Encoder that the position of the axis is of, and over which the drive closes its position loop: `"motor"`; `"dual"`, that of the
+    /// load, while the velocity is the motor's; `"load"`, both are the load's. Not on DeviceNet. Default: `"motor"`.
+    #[schemars(transform = form::word(&check::axis::feedback_uses()))]
+    pub feedback: Option<Spanned<String>>,
     /// Position counts of the controller in one unit, 1 to 2147483647. Default: 1000000.
     #[schemars(range(min = 1, max = 2_147_483_647))]
     pub motion_resolution: Option<Spanned<i64>>,

@@ -7,7 +7,7 @@ use profile_generic::scaling::UnitKind;
 use profile_sercos::master::config::AddressPolicy;
 
 use super::*;
-use crate::mapping::{CaptureMode, Rated};
+use crate::mapping::{CaptureMode, FeedbackUse, Rated};
 
 /// A small configuration without faults; the cases below break it in one place.
 const GOOD: &str = r#"[box]
@@ -99,6 +99,7 @@ fn defaults_are_those_of_the_documentation() {
             device: 0,
             drive: DriveAt::Sercos { drive: 0 },
             function: AxisFunction::Drive,
+            feedback: FeedbackUse::Motor,
             kind: AxisKind::Rotary,
             motion_resolution: 1_000_000,
             unwind_counts: None,

@@ -278,6 +278,7 @@ fn of_axis(entry: &mut AxisStatus, axis: &AxisChannel) {
     entry.saturated = counters.saturated;
     entry.faults = counters.faults;
     entry.image = ImageStatus::of(axis.command(), feedback);
+    entry.totals = axis.totals();
 }
 
 /// The DINT that a position is on the controller's side: it wraps.

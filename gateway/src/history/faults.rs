@@ -1,19 +1,20 @@
 //! The fault history of a gateway: in memory, and in a file where there is a directory for it.
 
-use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard};
 use std::time::SystemTime;
 
-use tracing::{info, warn};
-
-use super::book::Book;
-use super::file::{self, Found, NAME};
+use super::book::{Book, RECORDS_MAX};
+use super::file::{self, Kept, Kind};
 use super::record::FaultRecord;
-use super::utc;
+use super::{lock, utc};
 use crate::engine::notice::Notice;
 use crate::local::installation::Installation;
-use crate::replace_file::replace_file;
 use crate::status::BoxStatus;
+
+/// Its file.
+pub(super) const KIND: Kind =
+    Kind { name: "faults.jsonl", title: "fault history", record: "a fault", records_max: RECORDS_MAX };
 
 /// The faults of the axes of a gateway, those of earlier runs included where they are kept in a file.
 #[derive(Debug, Default)]
@@ -22,55 +23,12 @@ pub struct FaultHistory {
     file: Option<Mutex<Kept>>,
 }
 
-/// The file.
-#[derive(Debug)]
-struct Kept {
-    path: PathBuf,
-    /// The changes of the book that are in it.
-    changes: u64,
-    /// The last attempt to write it has failed.
-    failed: bool,
-}
-
 impl FaultHistory {
     /// Reads the history of earlier runs. Whatever is wrong with its file is logged, and the history begins anew.
     #[must_use]
     pub fn open(directory: &Path) -> Self {
-        let path = directory.join(NAME);
-        let shown = path.display();
-        if let Err(error) = std::fs::create_dir_all(directory) {
-            warn!(directory = %directory.display(), %error, "the directory of the fault history cannot be made: faults are kept in memory only");
-            return Self::default();
-        }
-        let records = match file::read(&path) {
-            Ok(Found::Nothing) => Vec::new(),
-            Ok(Found::Whole(records)) => records,
-            Ok(Found::Damaged(what)) => match file::put_aside(&path) {
-                Ok(aside) => {
-                    warn!(
-                        "the fault history {shown} is damaged: {what}; it is kept as {}, and a new one begins",
-                        aside.display()
-                    );
-                    Vec::new()
-                }
-                Err(error) => {
-                    warn!(
-                        "the fault history {shown} is damaged: {what}; it cannot be put aside: {error}: faults are kept in memory only"
-                    );
-                    return Self::default();
-                }
-            },
-            // It may be whole: it is not overwritten.
-            Err(error) => {
-                warn!("the fault history {shown} cannot be read: {error}: faults are kept in memory only");
-                return Self::default();
-            }
-        };
-        if !records.is_empty() {
-            info!(faults = records.len(), file = %shown, "fault history");
-        }
-        let book = Mutex::new(Book::of(records));
-        Self { book, file: Some(Mutex::new(Kept { path, changes: 0, failed: false })) }
+        let (records, kept) = Kept::open(directory, KIND);
+        Self { book: Mutex::new(Book::of(records)), file: kept.map(Mutex::new) }
     }
 
     /// Takes what the cycle reports.
@@ -106,7 +64,7 @@ impl FaultHistory {
     #[must_use]
     pub fn is_unsaved(&self) -> bool {
         let changes = self.book().changes();
-        self.file.as_ref().is_some_and(|kept| lock(kept).changes != changes)
+        self.file.as_ref().is_some_and(|kept| lock(kept).changes() != changes)
     }
 
     /// Writes the file if something has changed. It waits for the disk. A failure is logged once, until it works again.
@@ -115,27 +73,14 @@ impl FaultHistory {
         let mut kept = lock(kept);
         let (changes, text) = {
             let book = self.book();
-            if book.changes() == kept.changes {
+            if book.changes() == kept.changes() {
                 return;
             }
             let mut records: Vec<_> = book.records().collect();
             records.reverse();
-            (book.changes(), file::encode(records.into_iter()))
+            (book.changes(), file::encode(KIND, records.into_iter()))
         };
-        let file = kept.path.display().to_string();
-        match text.and_then(|text| replace_file(&kept.path, &text)) {
-            Ok(()) => {
-                kept.changes = changes;
-                if std::mem::take(&mut kept.failed) {
-                    info!(file, "the fault history is written again");
-                }
-            }
-            Err(error) => {
-                if !std::mem::replace(&mut kept.failed, true) {
-                    warn!(file, %error, "the fault history cannot be written; it is tried again");
-                }
-            }
-        }
+        kept.write(changes, text);
     }
 
     fn book(&self) -> MutexGuard<'_, Book> {
@@ -143,12 +88,10 @@ impl FaultHistory {
     }
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use profile_generic::fault::{Fault, FaultCause};
     use profile_generic::time::SystemTime as CipTime;
 
@@ -194,7 +137,7 @@ mod tests {
     fn damaged_file_is_put_aside_and_the_next_one_is_whole() {
         let directory = folder("damaged");
         std::fs::create_dir_all(&directory).unwrap();
-        std::fs::write(directory.join(NAME), "half a").unwrap();
+        std::fs::write(directory.join(KIND.name), "half a").unwrap();
         let history = FaultHistory::open(&directory);
         assert!(history.list(None).is_empty());
         let aside = directory.join("faults.jsonl.damaged-1");

@@ -1,5 +1,4 @@
-//! The file of the fault history: one JSON object a line, oldest first, between a line that says what it is and one that says that it
-//! is whole.
+//! The files of the history: one JSON object a line, between a line that says what it is and one that says that it is whole.
 //!
 //! ```text
 //! {"format":1,"file":"axisbridge fault history"}
@@ -11,17 +10,26 @@ use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use tracing::{info, warn};
 
-use super::book::RECORDS_MAX;
-use super::record::FaultRecord;
-
-/// Its name in the directory of the history.
-pub(super) const NAME: &str = "faults.jsonl";
+use crate::replace_file::replace_file;
 
 const FORMAT: u32 = 1;
 
-const WHAT: &str = "axisbridge fault history";
+/// What a file holds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kind {
+    /// Its name in the directory of the history.
+    pub name: &'static str,
+    /// What it is, as people read it.
+    pub title: &'static str,
+    /// What a line of it is.
+    pub record: &'static str,
+    /// Lines.
+    pub records_max: usize,
+}
 
 /// Bytes of a file; a record has some hundred.
 const LEN_MAX: u64 = 4 << 20;
@@ -45,18 +53,100 @@ struct Tail {
 
 /// What was found.
 #[derive(Debug)]
-pub(super) enum Found {
+pub(super) enum Found<T> {
     /// No file.
     Nothing,
-    /// A whole history, oldest first.
-    Whole(Vec<FaultRecord>),
+    /// A whole one.
+    Whole(Vec<T>),
     /// Something else.
     Damaged(String),
 }
 
+/// A file of this process, which is written again and again.
+#[derive(Debug)]
+pub(super) struct Kept {
+    kind: Kind,
+    path: PathBuf,
+    /// The number of the changes that are in it.
+    changes: u64,
+    /// The last attempt to write it has failed.
+    failed: bool,
+}
+
+impl Kept {
+    /// Reads what earlier runs have written, and keeps the file. Whatever is wrong with it is logged, and it begins anew; `None` where it
+    /// cannot be written.
+    pub fn open<T: DeserializeOwned>(directory: &Path, kind: Kind) -> (Vec<T>, Option<Self>) {
+        let path = directory.join(kind.name);
+        let (shown, title) = (path.display(), kind.title);
+        if let Err(error) = std::fs::create_dir_all(directory) {
+            warn!(directory = %directory.display(), %error, "the directory of the {title} cannot be made: it is kept in memory only");
+            return (Vec::new(), None);
+        }
+        let records = match read(&path, kind) {
+            Ok(Found::Nothing) => Vec::new(),
+            Ok(Found::Whole(records)) => records,
+            Ok(Found::Damaged(what)) => match put_aside(&path) {
+                Ok(aside) => {
+                    warn!(
+                        "the {title} {shown} is damaged: {what}; it is kept as {}, and a new one begins",
+                        aside.display()
+                    );
+                    Vec::new()
+                }
+                Err(error) => {
+                    warn!(
+                        "the {title} {shown} is damaged: {what}; it cannot be put aside: {error}: it is kept in memory only"
+                    );
+                    return (Vec::new(), None);
+                }
+            },
+            // It may be whole: it is not overwritten.
+            Err(error) => {
+                warn!("the {title} {shown} cannot be read: {error}: it is kept in memory only");
+                return (Vec::new(), None);
+            }
+        };
+        if !records.is_empty() {
+            info!(records = records.len(), file = %shown, "{title}");
+        }
+        (records, Some(Self { kind, path, changes: 0, failed: false }))
+    }
+
+    /// The number of the changes that are in the file.
+    pub const fn changes(&self) -> u64 {
+        self.changes
+    }
+
+    /// Writes the file. It waits for the disk. A failure is logged once, until it works again.
+    pub fn write(&mut self, changes: u64, text: io::Result<String>) {
+        let (file, title) = (self.path.display().to_string(), self.kind.title);
+        match text.and_then(|text| replace_file(&self.path, &text)) {
+            Ok(()) => {
+                self.changes = changes;
+                if std::mem::take(&mut self.failed) {
+                    info!(file, "the {title} is written again");
+                }
+            }
+            Err(error) => {
+                if !std::mem::replace(&mut self.failed, true) {
+                    warn!(file, %error, "the {title} cannot be written; it is tried again");
+                }
+            }
+        }
+    }
+}
+
+fn head(kind: Kind) -> Head {
+    Head { format: FORMAT, file: format!("axisbridge {}", kind.title) }
+}
+
 /// The text of a file.
-pub(super) fn encode<'a>(records: impl Iterator<Item = &'a FaultRecord>) -> io::Result<String> {
-    let mut text = serde_json::to_string(&Head { format: FORMAT, file: WHAT.to_owned() })?;
+pub(super) fn encode<'a, T: Serialize + 'a>(
+    kind: Kind,
+    records: impl Iterator<Item = &'a T>,
+) -> io::Result<String> {
+    let mut text = serde_json::to_string(&head(kind))?;
     text.push('\n');
     let mut count = 0;
     for record in records {
@@ -73,7 +163,7 @@ pub(super) fn encode<'a>(records: impl Iterator<Item = &'a FaultRecord>) -> io::
 ///
 /// # Errors
 /// It is there and cannot be read.
-pub(super) fn read(path: &Path) -> io::Result<Found> {
+pub(super) fn read<T: DeserializeOwned>(path: &Path, kind: Kind) -> io::Result<Found<T>> {
     let length = match std::fs::metadata(path) {
         Ok(metadata) => metadata.len(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
@@ -84,13 +174,14 @@ pub(super) fn read(path: &Path) -> io::Result<Found> {
     }
     let bytes = std::fs::read(path)?;
     Ok(match std::str::from_utf8(&bytes) {
-        Ok(text) => decode(text).map_or_else(Found::Damaged, Found::Whole),
+        Ok(text) => decode(text, kind).map_or_else(Found::Damaged, Found::Whole),
         Err(error) => Found::Damaged(format!("byte {} is not UTF-8 text", error.valid_up_to())),
     })
 }
 
 /// The records of a text, or what is wrong with it.
-fn decode(text: &str) -> Result<Vec<FaultRecord>, String> {
+fn decode<T: DeserializeOwned>(text: &str, kind: Kind) -> Result<Vec<T>, String> {
+    let Kind { title, record: what, records_max, .. } = kind;
     let whole = text.strip_suffix('\n').ok_or("its last line has no end: it was cut")?;
     let at = whole.rfind('\n').ok_or("it has one line only: it was cut")? + 1;
     let (covered, last) = (&text[..at], &whole[at..]);
@@ -102,21 +193,21 @@ fn decode(text: &str) -> Result<Vec<FaultRecord>, String> {
         return Err(format!("line {number}: expected CRC {found}, found {}", tail.crc32));
     }
     let mut lines = covered.lines();
-    let head: Head = serde_json::from_str(lines.next().unwrap_or_default())
-        .map_err(|error| format!("line 1: expected the head of a fault history: {error}"))?;
-    let expected = Head { format: FORMAT, file: WHAT.to_owned() };
-    if head != expected {
-        return Err(format!("line 1: expected {expected:?}, found {head:?}"));
+    let found: Head = serde_json::from_str(lines.next().unwrap_or_default())
+        .map_err(|error| format!("line 1: expected the head of the {title}: {error}"))?;
+    let expected = head(kind);
+    if found != expected {
+        return Err(format!("line 1: expected {expected:?}, found {found:?}"));
     }
     let mut records = Vec::new();
     for (line, text) in (2..).zip(lines) {
         let record = serde_json::from_str(text);
-        records.push(record.map_err(|error| format!("line {line}: expected a fault: {error}"))?);
+        records.push(record.map_err(|error| format!("line {line}: expected {what}: {error}"))?);
     }
-    if records.len() != tail.records || records.len() > RECORDS_MAX {
+    if records.len() != tail.records || records.len() > records_max {
         let count = records.len();
         return Err(format!(
-            "line {number}: it says {} records, at most {RECORDS_MAX}, found {count}",
+            "line {number}: it says {} records, at most {records_max}, found {count}",
             tail.records
         ));
     }
@@ -124,7 +215,7 @@ fn decode(text: &str) -> Result<Vec<FaultRecord>, String> {
 }
 
 /// Gives a damaged file another name, so that a new one can be written and the damaged one be looked at.
-pub(super) fn put_aside(path: &Path) -> io::Result<PathBuf> {
+fn put_aside(path: &Path) -> io::Result<PathBuf> {
     let name = |number: u32| {
         let mut name = path.as_os_str().to_owned();
         name.push(format!(".damaged-{number}"));
@@ -143,9 +234,14 @@ fn crc32(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::FaultEnd;
+    use crate::history::faults::KIND;
+    use crate::history::{FaultEnd, FaultRecord};
     use crate::replace_file::power_cut::PowerCut;
     use crate::replace_file::{replace_file, replace_on};
+
+    fn found(path: &Path) -> Found<FaultRecord> {
+        read(path, KIND).unwrap()
+    }
 
     /// A folder that is removed with the test.
     struct Folder(PathBuf);
@@ -159,7 +255,7 @@ mod tests {
         }
 
         fn file(&self) -> PathBuf {
-            self.0.join(NAME)
+            self.0.join(KIND.name)
         }
     }
 
@@ -181,11 +277,11 @@ mod tests {
     }
 
     fn text(records: &[FaultRecord]) -> String {
-        encode(records.iter()).unwrap()
+        encode(KIND, records.iter()).unwrap()
     }
 
     fn whole(path: &Path) -> Vec<FaultRecord> {
-        match read(path).unwrap() {
+        match found(path) {
             Found::Whole(records) => records,
             other => panic!("{other:?}"),
         }
@@ -194,7 +290,7 @@ mod tests {
     #[test]
     fn what_is_written_is_read_again() {
         let folder = Folder::new("again");
-        assert!(matches!(read(&folder.file()).unwrap(), Found::Nothing));
+        assert!(matches!(found(&folder.file()), Found::Nothing));
         for count in [0, 1, 3] {
             replace_file(&folder.file(), &text(&records(count))).unwrap();
             assert_eq!(whole(&folder.file()), records(count));
@@ -228,7 +324,7 @@ mod tests {
         for step in 0..=steps {
             let _ = std::fs::remove_file(folder.file());
             let done = replace_on(&mut PowerCut::after(step, true), &folder.file(), &bytes);
-            match read(&folder.file()).unwrap() {
+            match found(&folder.file()) {
                 Found::Nothing => assert!(done.is_err()),
                 Found::Whole(found) => assert_eq!((found, done.is_ok()), (new.clone(), true)),
                 Found::Damaged(what) => panic!("step {step}: {what}"),
@@ -242,13 +338,13 @@ mod tests {
         let good = text(&records(2)).into_bytes();
         for end in 0..good.len() {
             std::fs::write(folder.file(), &good[..end]).unwrap();
-            assert!(matches!(read(&folder.file()).unwrap(), Found::Damaged(_)), "cut at {end}");
+            assert!(matches!(found(&folder.file()), Found::Damaged(_)), "cut at {end}");
         }
         for at in 0..good.len() {
             let mut bytes = good.clone();
             bytes[at] ^= 1;
             std::fs::write(folder.file(), &bytes).unwrap();
-            assert!(matches!(read(&folder.file()).unwrap(), Found::Damaged(_)), "changed at {at}");
+            assert!(matches!(found(&folder.file()), Found::Damaged(_)), "changed at {at}");
         }
     }
 
@@ -267,7 +363,7 @@ mod tests {
             (sealed(&format!("{head}{{\"number\":-1}}\n"), 1), "line 2: expected a fault: invalid value"),
             (sealed(head, 7), "line 2: it says 7 records, at most 1000, found 0"),
         ] {
-            let error = decode(&text).unwrap_err();
+            let error = decode::<FaultRecord>(&text, KIND).unwrap_err();
             assert!(error.contains(what), "{error}");
         }
     }

@@ -1,15 +1,17 @@
-//! What has happened: the last lines of the log, and the faults of each axis.
+//! What has happened: the last lines of the log, the faults of each axis, and what each axis has done in its life.
 //!
 //! ```text
 //! tracing --line--> standard error
 //!            \-----> EventRing  --> local socket, HTTP
 //! notices of the cycle --> FaultHistory --> local socket, HTTP
 //!                              \--------> file
+//! published status --> CounterHistory --> file, and from there into the axes of the next run
 //! ```
 //!
-//! Both are fed outside the cycle. The ring is a layer of the logger, so that it has exactly the lines that are logged.
+//! They are fed outside the cycle. The ring is a layer of the logger, so that it has exactly the lines that are logged.
 
 mod book;
+mod counters;
 mod event;
 mod faults;
 mod file;
@@ -17,9 +19,11 @@ mod layer;
 mod record;
 mod ring;
 
-use std::sync::Arc;
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
+pub use self::counters::CounterHistory;
 pub use self::event::LogEvent;
 pub use self::faults::FaultHistory;
 pub use self::layer::{LinesOf, RingLayer};
@@ -33,10 +37,28 @@ pub struct Histories {
     pub events: Arc<EventRing>,
     /// The faults of the axes.
     pub faults: Arc<FaultHistory>,
+    /// The counters of the axes.
+    pub counters: Arc<CounterHistory>,
+}
+
+impl Histories {
+    /// The same with the files of a directory.
+    #[must_use]
+    pub fn kept_in(&self, directory: &Path) -> Self {
+        Self {
+            events: Arc::clone(&self.events),
+            faults: Arc::new(FaultHistory::open(directory)),
+            counters: Arc::new(CounterHistory::open(directory)),
+        }
+    }
 }
 
 /// The last second that RFC 3339 can name, since 1970.
 const LAST_SECOND: Duration = Duration::from_secs(253_402_300_799);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A time of the host as text: UTC, RFC 3339, microseconds. A clock that is set beyond what the text can have is at its end.
 pub(crate) fn utc(time: SystemTime) -> String {

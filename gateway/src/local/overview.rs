@@ -36,6 +36,9 @@ const MICRO: f64 = 1e6;
 /// Thousandths in a unit.
 const MILLI: f64 = 1e3;
 
+/// Nanoseconds in an hour.
+const NANO_PER_HOUR: f64 = 3_600.0 * NANO;
+
 /// Millionths of the rated torque in a percent of it.
 const PARTS_PER_PERCENT: f64 = 10_000.0;
 
@@ -303,6 +306,12 @@ pub struct Axis {
     /// Temperature of the motor in degrees Celsius, where the telegram of the drive has it.
     #[serde(default)]
     pub temperature: Option<f64>,
+    /// Time in operation, hours; counted over restarts where there is a `[history]`.
+    #[serde(default)]
+    pub run_hours: f64,
+    /// Revolutions of the motor in both directions, counted alike; 0 where its gear is not known.
+    #[serde(default)]
+    pub motor_turns: f64,
 }
 
 impl Overview {
@@ -546,6 +555,8 @@ impl Axis {
             current: actual(FeedbackSet::CURRENT, image.current.get(), MICRO),
             bus_voltage: actual(FeedbackSet::BUS_VOLTAGE, image.bus_voltage.get(), MICRO),
             temperature: actual(FeedbackSet::TEMPERATURE, image.temperature.get(), MILLI),
+            run_hours: f64_from_i64(axis.totals.run_time.0) / NANO_PER_HOUR,
+            motor_turns: f64_from_i64(axis.totals.motor_turns) / MICRO,
         }
     }
 }

@@ -280,6 +280,9 @@ pub fn start(
     }
 
     let histories = extras.histories.cloned().unwrap_or_default();
+    for (axis, of) in engine.axes_mut().iter_mut().zip(&config.axes) {
+        axis.begin_totals(histories.counters.of(&of.name));
+    }
     let limit = Arc::new(LineLimit::default());
     let (time, feed) = TimeService::start(&config.time, &clock_place(&adapters, &ports))?;
 
@@ -729,6 +732,7 @@ impl RunningBox {
         if let Some(recording) = self.recording {
             recording.close();
         }
+        self.histories.counters.save();
         let summary = self.recorder.map(Recorder::finish).transpose()?;
         Ok(Stopped { dropped: summary.map(|summary| summary.dropped), unrested })
     }

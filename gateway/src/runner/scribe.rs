@@ -1,4 +1,4 @@
-//! Writes down what the cycle thread reports: the lines of the log, and the history of faults.
+//! Writes down what the cycle thread reports: the lines of the log, the history of faults, and the counters of the axes.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,6 +20,10 @@ use crate::sys::clock::monotonic_now;
 
 /// Least time from one writing of the fault history to the next: a fault comes with several changes, and a disk wears.
 const SAVE_INTERVAL: Duration = Duration::from_secs(2);
+
+/// Time from one writing of the counters to the next: they change with every cycle of an axis in operation. A loss of power takes the
+/// counts of this time.
+const COUNTERS_INTERVAL: Duration = Duration::from_secs(600);
 
 /// After this time every line that was left out has a count.
 const LONG: DurationNs = DurationNs::from_secs(3_600);
@@ -56,6 +60,7 @@ impl Scribe {
     pub async fn run(self, mut notices: rtrb::Consumer<Notice>, stop: Arc<AtomicBool>) {
         let mut interval = tokio::time::interval(NOTICE_INTERVAL);
         let mut began = tokio::time::Instant::now();
+        let mut counted = began;
         let mut saving: Option<JoinHandle<()>> = None;
         let mut recording_saves: Option<JoinHandle<()>> = None;
         loop {
@@ -69,6 +74,7 @@ impl Scribe {
             if let Some(recording) = &self.recording {
                 recording.look(&status);
             }
+            self.histories.counters.look(&status, &self.names);
             if last {
                 self.limit.report(monotonic_now() + LONG, &self.axes);
                 return;
@@ -80,6 +86,10 @@ impl Scribe {
                 let faults = Arc::clone(&self.histories.faults);
                 // It waits for the disk; notices do not.
                 saving = Some(tokio::task::spawn_blocking(move || faults.save()));
+            } else if idle && counted.elapsed() >= COUNTERS_INTERVAL && self.histories.counters.is_unsaved() {
+                counted = tokio::time::Instant::now();
+                let counters = Arc::clone(&self.histories.counters);
+                saving = Some(tokio::task::spawn_blocking(move || counters.save()));
             }
             let idle = recording_saves.as_ref().is_none_or(JoinHandle::is_finished);
             if let Some(recording) =

@@ -32,7 +32,7 @@ use self::image::IMAGE_WORDS;
 use self::lateness::LATENESS_WORDS;
 use self::wait::WAIT_WORDS;
 use crate::config::AXES_MAX;
-use crate::engine::axis::Owner;
+use crate::engine::axis::{Owner, Totals};
 use crate::engine::phase_lock::{LockState, Phase};
 use crate::latest::Words;
 
@@ -40,7 +40,7 @@ use crate::latest::Words;
 const OWNERS: [Owner; 3] = [Owner::Nobody, Owner::Controller, Owner::Local];
 
 /// Words of one axis in the published form.
-const AXIS_WORDS: usize = 13 + WAIT_WORDS + IMAGE_WORDS;
+const AXIS_WORDS: usize = 16 + WAIT_WORDS + IMAGE_WORDS;
 
 /// Words of the box itself.
 const BOX_WORDS: usize = 10 + LATENESS_WORDS;
@@ -130,6 +130,8 @@ pub struct AxisStatus {
     pub saturated: u32,
     /// Faults raised since the start.
     pub faults: u32,
+    /// What the axis has done in its life.
+    pub totals: Totals,
     /// What the indicators show for the axis and its device.
     pub indicators: Indicators,
     /// The controller that is connected to its device.
@@ -244,6 +246,7 @@ impl AxisStatus {
         lost_telegrams: 0,
         saturated: 0,
         faults: 0,
+        totals: Totals { run_time: DurationNs(0), motor_turns: 0, motor_work: 0 },
         indicators: Indicators::NONE,
         controller: None,
         node: NodeStatus::Unknown,
@@ -385,6 +388,9 @@ impl AxisStatus {
             self.commands,
             pair(self.lost_updates, self.lost_telegrams),
             pair(self.saturated, self.faults),
+            self.totals.run_time.0.cast_unsigned(),
+            self.totals.motor_turns.cast_unsigned(),
+            self.totals.motor_work.cast_unsigned(),
             self.indicators.to_word(),
             Controller::to_word(self.controller),
             self.node.to_word(),
@@ -410,6 +416,9 @@ impl AxisStatus {
             commands,
             lost,
             other,
+            run_time,
+            motor_turns,
+            motor_work,
             indicators,
             controller,
             node,
@@ -448,6 +457,11 @@ impl AxisStatus {
             lost_telegrams,
             saturated,
             faults,
+            totals: Totals {
+                run_time: DurationNs(run_time.cast_signed()),
+                motor_turns: motor_turns.cast_signed(),
+                motor_work: motor_work.cast_signed(),
+            },
             indicators: Indicators::from_word(indicators),
             controller: Controller::from_word(controller),
             node: NodeStatus::from_word(node),
@@ -631,6 +645,11 @@ pub(crate) mod tests {
             lost_telegrams: 0x7777_8888,
             saturated: 0x0999_0AAA,
             faults: 0x0BBB_0CCC,
+            totals: Totals {
+                run_time: DurationNs(3_600_000_000_017),
+                motor_turns: 12_345_678_901_234,
+                motor_work: -55_555,
+            },
             indicators: Indicators {
                 module: ModuleState::MajorRecoverableFault,
                 network: Indication::SOLID_GREEN,

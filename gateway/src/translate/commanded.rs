@@ -39,15 +39,15 @@ impl Translator {
                 None => node.push(Node::new(text!("instance {instance}: no axis of the configuration"))),
             }
         }
-        let allowed = stage.mapping.cip.feedback_modes;
         let mut replaced = Vec::new();
         for (number, block, _) in &known {
             let place = usize::from(stage.axes[*number].instance).saturating_sub(1);
             let bench = self.bench()?;
             if bench.is_unheard(*number) {
                 bench.enable(*number, block.control_mode);
-                if allowed & 1 << block.feedback_mode.source().0 == 0 {
-                    replaced.push((place, block.feedback_mode));
+                let usable = bench.feedback_mode(*number);
+                if block.feedback_mode.source() != usable.source() {
+                    replaced.push((place, block.feedback_mode, usable));
                 }
             }
         }
@@ -58,13 +58,14 @@ impl Translator {
             .iter()
             .map(|(number, ..)| usize::from(stage.axes[*number].instance).saturating_sub(1))
             .collect();
-        let replaced_places: Vec<usize> = replaced.iter().map(|(place, _)| *place).collect();
-        let told = bench.update(device, update, &places, &replaced_places);
+        let usable: Vec<_> = replaced.iter().map(|(place, _, usable)| (*place, *usable)).collect();
+        let told = bench.update(device, update, &places, &usable);
         let said = bench.take_notices();
         for ((number, block, write), told) in known.into_iter().zip(told) {
             let instance = stage.axes[number].instance;
-            let replaced = replaced.iter().find(|(place, _)| *place + 1 == usize::from(instance));
-            let mut of_axis = self.command(number, block, replaced.map(|(_, mode)| *mode), &told, &said)?;
+            let replaced = replaced.iter().find(|(place, ..)| *place + 1 == usize::from(instance));
+            let mut of_axis =
+                self.command(number, block, replaced.map(|(_, mode, _)| *mode), &told, &said)?;
             if let Some(write) = write {
                 of_axis.push(self.written_cyclically(number, write));
             }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use profile_generic::image::Signal;
 use profile_generic::mode::{InterpolationSource, ModeSelection};
 use profile_generic::program::BitPattern;
 use profile_generic::quantity::Quantity;
@@ -285,7 +286,17 @@ impl<'a> Builder<'a> {
         let known = self.tables.signals.iter().any(|known| known.signal == signal && shared(known));
         once(&mut self.resolver, known, "signal", &row.signal);
         let polarity = row.polarity.as_ref().and_then(|name| self.polarity("polarity", name));
-        self.tables.signals.push(SignalRule { signal, value, modes, polarity, refuse });
+        let load = row.load.as_ref().and_then(|name| self.load_value(signal, name));
+        self.tables.signals.push(SignalRule { signal, value, modes, polarity, refuse, load });
+    }
+
+    fn load_value(&mut self, signal: Signal, name: &Name) -> Option<Value> {
+        let (value, _) = self.value("load", name)?;
+        if !self.measures(&value, signal.quantity()) {
+            let message = format!("the unit of {} is not a unit of {}", value.object, signal.quantity());
+            self.resolver.error(code::UNIT, name.span(), "load", message);
+        }
+        Some(value)
     }
 
     fn writable(&mut self, entry: &Cia402Sub, to_drive: bool, direction: &Name, object: Object) {

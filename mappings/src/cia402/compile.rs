@@ -22,6 +22,7 @@ use crate::drive_program::{
     PROCEDURE_FAILURES_MAX, ParameterEntry, Procedure, ProcedureBy, StatusRow, StepRow, Telegram, WORD_BYTES,
 };
 use crate::drive_rows::Full;
+use crate::feedback::FeedbackUse;
 use crate::item::Item;
 use crate::mechanics::Mechanics;
 use crate::sercos::scaling::AxisUnits;
@@ -60,6 +61,10 @@ pub struct Cia402Axis {
     pub offsets: Vec<Signal>,
     /// How its captures are used.
     pub captures: CaptureMode,
+    /// Whose encoder its position and velocity are of.
+    pub feedback: FeedbackUse,
+    /// It is never switched on: of a load, its position is what the drive shows of that encoder beside its loops.
+    pub only_looks: bool,
 }
 
 impl Cia402Axis {
@@ -372,6 +377,7 @@ impl Cia402Tables {
         program.add_faults(self.faults.iter().map(|row| FaultRow { word: error, ..*row }))?;
         program.add_parameters(&self.parameters, |rule| self.entry(rule, axis, facts))?;
         program.mechanics = Some(self.mechanics(axis, facts));
+        program.set_encoders(axis.feedback, axis.only_looks);
         Ok(program)
     }
 

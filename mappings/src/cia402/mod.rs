@@ -78,6 +78,8 @@ pub(crate) struct SignalRule {
     pub polarity: Option<u32>,
     /// Whether an axis cannot work without it.
     pub refuse: bool,
+    /// The object of the encoder of the load.
+    pub load: Option<Value>,
 }
 
 /// A mode of operation: its code, and its bit in the list of those that a drive has.
@@ -257,6 +259,19 @@ pub struct Cia402Tables {
     pub unbound: Vec<(u16, String)>,
     /// Those that no row binds for no reason.
     pub(crate) unanswered: Vec<u16>,
+}
+
+impl Cia402Tables {
+    /// The tables for axes that only look at the encoder of the load.
+    pub(crate) fn for_load(&self) -> Self {
+        let mut tables = self.clone();
+        for rule in &mut tables.signals {
+            if let Some(load) = &rule.load {
+                rule.value.clone_from(load);
+            }
+        }
+        tables
+    }
 }
 
 impl Cia402Tables {

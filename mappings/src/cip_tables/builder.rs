@@ -22,6 +22,7 @@ use crate::compile_cip::{
 };
 use crate::device_link::DRIVE_ACTIONS;
 use crate::dictionary::{Access, CipAttribute, Dictionaries, GenericParameter, quantity};
+use crate::feedback::FeedbackUse;
 use crate::finding::Findings;
 use crate::finding::registry as code;
 use crate::format::{
@@ -259,8 +260,14 @@ impl Builder<'_> {
     fn feedback_modes(&mut self, rows: &CipGenericFile) {
         for row in &rows.feedback_mode {
             let code = self.byte_code("Feedback Mode", "feedback_mode", &row.feedback_mode);
-            self.tables.feedback_modes |=
-                code.and_then(|code| 1_u16.checked_shl(u32::from(code))).unwrap_or(0);
+            let known = FeedbackUse::ALL.iter().enumerate().map(|(at, of)| (of.name(), at));
+            let find = |name: &str| known.clone().find(|(known, _)| *known == name).map(|(_, at)| at);
+            let names = known.clone().map(|(name, _)| name);
+            let at = self.resolver.name("feedback", &row.feedback, "a use of the encoders", find, names);
+            if let (Some(code), Some(slot)) = (code, at.and_then(|at| self.tables.feedback_modes.get_mut(at)))
+            {
+                *slot = Some(code);
+            }
         }
     }
 
@@ -612,6 +619,7 @@ impl Builder<'_> {
             ("actuator_type", &row.actuator_type, actuator_type),
             ("lead", &row.lead, Some(MechanicalFact::Lead)),
             ("diameter", &row.diameter, Some(MechanicalFact::Diameter)),
+            ("unit_ratio", &row.unit_ratio, Some(MechanicalFact::UnitRatio)),
         ] {
             let id = self.attribute_id(key, name);
             self.tables.mechanics.extend(fact.map(|fact| (id, fact)));

@@ -18,6 +18,7 @@ use super::compile_cip::{
 };
 use super::device_link::DRIVE_ACTIONS;
 use super::dictionary::{CipAttribute, CipType};
+use super::feedback::FeedbackUse;
 use super::mechanics::MechanicalFact;
 
 /// What multiplies the ratio of a unit.
@@ -334,8 +335,8 @@ pub struct CipTables {
     units: Vec<(String, Quantity, CipUnit)>,
     pub(super) cyclic: Vec<CyclicElement>,
     pub(super) modes: [Option<OperatingMode>; 16],
-    /// Feedback modes that an axis can be enabled with, as bits numbered by the code.
-    pub feedback_modes: u16,
+    /// The Feedback Mode of each use of the encoders, in their order.
+    pub(super) feedback_modes: [Option<u8>; FeedbackUse::ALL.len()],
     pub(super) requests: Vec<CipRequest>,
     pub(super) drive_actions: [(DriveAction, Option<Request>); DRIVE_ACTIONS.len()],
     pub(super) states: [CipState; DriveState::ALL.len()],
@@ -362,6 +363,14 @@ impl ServedAttribute {
 }
 
 impl CipTables {
+    /// The Feedback Modes that an axis can be enabled with that uses its encoders so, as bits numbered by the code.
+    #[must_use]
+    pub fn feedback_modes(&self, feedback: FeedbackUse) -> u16 {
+        let at = FeedbackUse::ALL.iter().position(|of| *of == feedback);
+        let code = at.and_then(|at| self.feedback_modes.get(at).copied().flatten());
+        code.and_then(|code| 1_u16.checked_shl(u32::from(code))).unwrap_or(0)
+    }
+
     /// Forgets the rows of units.
     pub(super) fn forget_units(&mut self) {
         self.units.clear();

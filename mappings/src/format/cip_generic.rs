@@ -213,6 +213,8 @@ pub struct CipModeRow {
 pub struct FeedbackModeRow {
     /// Feedback mode.
     pub feedback_mode: Name,
+    /// Axes that can be enabled with it, by the encoders that they go by: `motor`, `load` or `dual`.
+    pub feedback: Name,
     /// Where it comes from.
     pub source: Source,
 }
@@ -421,6 +423,8 @@ pub struct MechanicsRow {
     pub lead: Name,
     /// Diameter of a wheel with that circumference, millimetre.
     pub diameter: Name,
+    /// Revolutions of the encoder of the motor in a unit of that of the load.
+    pub unit_ratio: Name,
     /// Where it comes from.
     pub source: Source,
 }

@@ -165,6 +165,8 @@ pub struct Cia402SignalRow {
     pub polarity: Option<Name>,
     /// What happens when the drive has no such object: `refuse` or `omit`.
     pub missing: Name,
+    /// Object of the encoder of the load, for axes that only look at that one. Default: none.
+    pub load: Option<Name>,
     /// Where it comes from.
     pub source: Source,
 }

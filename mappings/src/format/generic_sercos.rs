@@ -321,8 +321,20 @@ pub struct SercosSignalRow {
     pub missing: Name,
     /// The bit by which the drive inverts the value.
     pub polarity: Option<PolarityRow>,
+    /// The same value by the encoder of the load, for axes that go by that one.
+    pub load: Option<LoadSignalRow>,
     /// Where it comes from.
     pub source: Source,
+}
+
+/// A signal by the encoder of the load.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoadSignalRow {
+    /// IDN.
+    pub idn: Name,
+    /// The bit by which the drive inverts the value.
+    pub polarity: Option<PolarityRow>,
 }
 
 /// An operating mode on SERCOS.
@@ -338,6 +350,9 @@ pub struct SercosModeRow {
     pub missing: Name,
     /// Operation mode codes, the preferred one first.
     pub codes: Vec<Name>,
+    /// The same for axes whose position is that of the encoder of the load. Default: `codes`.
+    #[serde(default)]
+    pub load_codes: Vec<Name>,
     /// Signals in the master's telegram.
     pub command: Vec<Name>,
     /// Signals in the drive's telegram.

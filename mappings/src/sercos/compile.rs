@@ -24,6 +24,7 @@ use crate::drive_program::{
     ProcedureBy, StatusRow, Telegram, WORD_BYTES,
 };
 use crate::drive_rows::Full;
+use crate::feedback::FeedbackUse;
 use crate::item::Item;
 use crate::mechanics::Mechanics;
 
@@ -51,6 +52,8 @@ pub struct SercosAxis {
     pub captures: CaptureMode,
     /// The drive's status word does not report whether it follows command values and whether it is halted.
     pub silent: bool,
+    /// Whose encoder its position and velocity are of.
+    pub feedback: FeedbackUse,
 }
 
 /// Why no program can be made for an axis.
@@ -310,7 +313,7 @@ impl crate::Mapping {
     /// drive and from it.
     #[must_use]
     pub fn telegram_room(&self, axis: &SercosAxis) -> (u16, u16) {
-        Telegram::room(&self.sercos, &self.dictionaries.sercos, axis)
+        Telegram::room(self.sercos_of(axis), &self.dictionaries.sercos, axis)
     }
 }
 
@@ -446,6 +449,7 @@ impl DriveProgram {
         compiler.add_faults(&mut program)?;
         program.add_parameters(&tables.parameters, |rule| compiler.parameter(rule))?;
         program.mechanics = Some(compiler.mechanics());
+        program.encoders = axis.feedback;
         program.feeds_forward = compiler.feeds_forward();
         program.captures = captures::compile(&compiler, &program.telegram);
         Ok(program)

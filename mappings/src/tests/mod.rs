@@ -73,6 +73,7 @@ fn rotary_axis(modulo: bool) -> SercosAxis {
         parameters: Vec::new(),
         captures: CaptureMode::Off,
         silent: false,
+        feedback: FeedbackUse::Motor,
     }
 }
 

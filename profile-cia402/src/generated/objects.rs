@@ -229,6 +229,10 @@ pub const POSITIVE_TORQUE_LIMIT: u16 = 0x60E0;
 pub const NEGATIVE_TORQUE_LIMIT: u16 = 0x60E1;
 /// Supported homing methods.
 pub const SUPPORTED_HOMING_METHODS: u16 = 0x60E3;
+/// Additional position actual value.
+pub const ADDITIONAL_POSITION_ACTUAL: u16 = 0x60E4;
+/// Additional velocity actual value.
+pub const ADDITIONAL_VELOCITY_ACTUAL: u16 = 0x60E5;
 /// Following error actual value.
 pub const FOLLOWING_ERROR: u16 = 0x60F4;
 /// Control effort.

@@ -102,6 +102,10 @@ parameter_rows! {
         "Cycles in a unit of the encoder at the load.";
     LOAD_FEEDBACK_INTERPOLATION = 0x060E, "load_feedback_interpolation", BasicDrive, None, Integer, Write,
         "Counts in a cycle of the encoder at the load.";
+    MOTOR_ENCODER_SHOWN = 0x060F, "motor_encoder_shown", BasicDrive, None, Integer, Read,
+        "1 where the actual position is that of the encoder of the motor.";
+    FEEDBACK_MASTER = 0x0610, "feedback_master", BasicDrive, None, Integer, WriteWhileDisabled,
+        "Encoder that an axis shows which is never switched on: 1 that of the motor, 2 that of the load.";
 
     MOTOR_NAME = 0x0702, "motor_name", BasicDrive, None, Text, Read,
         "Type designation of the motor.";
@@ -309,6 +313,20 @@ parameter_rows! {
         "How long the control of the drive has been up, as far as the gateway has heard it.";
     HEARD_TIME = 0x0A26, "heard_time", BasicDrive, Time, Integer, Read,
         "How long the gateway has heard the drive without a break.";
+    RUN_TIME = 0x0A27, "run_time", BasicDrive, Time, Integer, Read,
+        "Time that the axis has been in operation in its life.";
+    COUNTED_RUN_TIME = 0x0A28, "counted_run_time", BasicDrive, Time, Integer, Read,
+        "The same as far as the gateway has counted it.";
+    OUTPUT_ENERGY = 0x0A29, "output_energy", BasicDrive, None, Integer, Read,
+        "Energy that the motor has given in its life less what it was given, in joules.";
+    COUNTED_WORK = 0x0A2A, "counted_work", BasicDrive, None, Integer, Read,
+        "The same as far as the gateway has counted it, in millionths of the rated torque times a revolution.";
+    RATED_WORK = 0x0A2B, "rated_work", BasicDrive, None, Integer, Read,
+        "Work of the rated torque in a revolution, in microjoules.";
+    MOTOR_TURNS = 0x0A2C, "motor_turns", BasicDrive, None, Integer, Read,
+        "Revolutions of the motor in its life, in both directions together.";
+    COUNTED_TURNS = 0x0A2D, "counted_turns", BasicDrive, None, Integer, Read,
+        "The same as far as the gateway has counted it, in millionths.";
 
     STOPPING_TORQUE = 0x0B04, "stopping_torque", BasicDrive, Torque, Integer, Write,
         "Torque of a stop at the current limit.";

@@ -14,7 +14,7 @@ use axisbridge::engine::notice::Notice;
 use axisbridge::engine::port::SouthPort;
 use axisbridge::engine::{Engine, Parts};
 use axisbridge::latest;
-use axisbridge::mapping::{AxisUnits, CaptureMode, Cia402Axis, SercosAxis};
+use axisbridge::mapping::{AxisUnits, CaptureMode, Cia402Axis, FeedbackUse, SercosAxis};
 use axisbridge::simulate::can_bus::InProcessCan;
 use axisbridge::simulate::can_drive::DriveNode;
 use axisbridge::simulate::drives::{DriveNetwork, drives};
@@ -198,6 +198,7 @@ impl GenericRig {
             parameters: Vec::new(),
             captures: CaptureMode::Off,
             silent: false,
+            feedback: FeedbackUse::Motor,
         };
         let mut line = drives([(ADDRESS, UnitKind::Rotary)], false);
         prepare(&mut needs, &mut line);

@@ -5,7 +5,7 @@ use crate::config::file::{AxisTable, LimitsTable};
 use crate::config::{Axis, AxisFunction, AxisKind, DriveAt, Limits, StoppingAction};
 use crate::finding::registry as code;
 use crate::finding::{Problem, Spanned};
-use crate::mapping::CaptureMode;
+use crate::mapping::{CaptureMode, FeedbackUse};
 
 /// What an axis counts in.
 pub(in crate::config) const UNITS: [(&str, AxisKind); 2] =
@@ -21,6 +21,11 @@ pub(in crate::config) const EVENTS: [(&str, CaptureMode); 3] = [
 /// What an axis can be.
 pub(in crate::config) fn functions() -> [(&'static str, AxisFunction); 3] {
     AxisFunction::ALL.map(|function| (function.name(), function))
+}
+
+/// Whose encoder an axis can go by.
+pub(in crate::config) fn feedback_uses() -> [(&'static str, FeedbackUse); 3] {
+    FeedbackUse::ALL.map(|feedback| (feedback.name(), feedback))
 }
 
 /// What an axis can do when commands stay away.
@@ -41,6 +46,7 @@ pub(super) fn check(
         problems.unknown("drive", &table.drive, drives.iter().map(|(name, _)| name.get_ref()));
     }
     let function = function(problems, table);
+    let feedback = function.and_then(|function| feedback(problems, table, function, drive));
     let kind = value::word(problems, &table.unit, "axis unit", &UNITS);
     let counts = 1..=i64::from(i32::MAX);
     let motion_resolution = value::number_or(
@@ -84,6 +90,7 @@ pub(super) fn check(
         drive: drive?,
         function: function?,
         kind: kind?,
+        feedback: feedback?,
         motion_resolution: motion_resolution?,
         unwind_counts: unwind_counts?,
         power_structure_axis_id: power_structure_axis_id?,
@@ -124,6 +131,35 @@ fn function(problems: &mut Problems, table: &AxisTable) -> Option<AxisFunction> 
     (problems.len() == before).then_some(function)
 }
 
+/// Whose encoder the axis goes by, and whether function and drive have it.
+fn feedback(
+    problems: &mut Problems,
+    table: &AxisTable,
+    function: AxisFunction,
+    drive: Option<DriveAt>,
+) -> Option<FeedbackUse> {
+    let Some(name) = &table.feedback else { return Some(FeedbackUse::Motor) };
+    let feedback = value::word(problems, name, "use of the encoders", &feedback_uses())?;
+    let why = match (feedback, function, drive) {
+        (FeedbackUse::Motor, ..) => None,
+        (_, _, Some(DriveAt::Devicenet { .. })) => {
+            Some("a drive on DeviceNet shows the encoder of its motor only")
+        }
+        (_, AxisFunction::Converter, _) => Some("a converter has no position"),
+        (FeedbackUse::Dual, AxisFunction::Encoder, _) => {
+            Some("an axis that is never switched on shows one encoder: \"motor\" or \"load\"")
+        }
+        _ => None,
+    };
+    if let Some(why) = why {
+        let title = format!("the axis cannot have feedback \"{}\"", feedback.name());
+        let problem = Problem::new(code::CONTRADICTION, name.span()).title(title);
+        problems.push(problem.expected(format!("expected feedback \"motor\", or none: {why}")));
+        return None;
+    }
+    Some(feedback)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::checked;
@@ -141,6 +177,26 @@ mod tests {
         assert_eq!(events(DriveAt::Sercos { drive: 0 }, ""), Ok(CaptureMode::Cyclic));
         assert_eq!(events(DriveAt::Can { bus: 0, drive: 0 }, ""), Ok(CaptureMode::ServiceChannel));
         assert_eq!(events(DriveAt::Can { bus: 0, drive: 0 }, "events = \"off\""), Ok(CaptureMode::Off));
+    }
+
+    #[test]
+    fn axis_goes_by_an_encoder_that_its_drive_has() {
+        let feedback = |drive, keys: &str| axis(drive, keys).map(|axis| axis.feedback);
+        let (sercos, can) = (DriveAt::Sercos { drive: 0 }, DriveAt::Can { bus: 0, drive: 0 });
+        let devicenet = DriveAt::Devicenet { network: 0, drive: 0 };
+        assert_eq!(feedback(sercos, ""), Ok(FeedbackUse::Motor));
+        for of in FeedbackUse::ALL {
+            let key = format!("feedback = \"{}\"", of.name());
+            assert_eq!(feedback(sercos, &key), Ok(of));
+            assert_eq!(feedback(can, &key), Ok(of));
+            let encoder = feedback(can, &format!("function = \"encoder\"\n{key}"));
+            assert_eq!(encoder.ok(), Some(of).filter(|of| *of != FeedbackUse::Dual));
+            let supply = feedback(sercos, &format!("function = \"converter\"\n{key}"));
+            assert_eq!(supply.ok(), Some(of).filter(|of| *of == FeedbackUse::Motor));
+            assert_eq!(feedback(devicenet, &key).ok(), Some(of).filter(|of| *of == FeedbackUse::Motor));
+        }
+        let refused = vec!["the axis cannot have feedback \"load\"".to_owned()];
+        assert_eq!(feedback(devicenet, "feedback = \"load\""), Err(refused));
     }
 
     #[test]

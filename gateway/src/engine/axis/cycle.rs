@@ -1,6 +1,7 @@
 //! What an axis does in a cycle of its bus: from the drive's telegram to feedback and faults, and from set-points to the next
 //! telegram. In between stands the state machine: whatever changes its state goes through [`AxisChannel::follow`].
 
+use super::counters::Sample;
 use super::diagnosis::{Kind, Shown, Shows};
 use super::guard::{Finding, Lead, way};
 use super::orders::ResetStep;
@@ -40,6 +41,7 @@ impl AxisChannel {
             // Not connected yet, or more losses in a row than the connection bears.
             self.age_feedback();
             self.supervision.restart_plausibility();
+            self.totals.restart_position();
             return self.report(now, system, Report::Silent);
         };
         if !received.fresh {
@@ -62,6 +64,7 @@ impl AxisChannel {
         self.report(now, system, self.feedback.report);
         self.advance_procedure(now);
         self.judge_position(now, system, sampled);
+        self.count(sampled);
         self.watch(now, system, moved);
     }
 
@@ -87,6 +90,7 @@ impl AxisChannel {
         if referenced != refers {
             // The drive counts from another place.
             self.supervision.restart();
+            self.totals.restart_position();
         }
         if !program.tells(Signal::VelocityActual) {
             self.feedback.present.remove(FeedbackSet::VELOCITY);
@@ -223,12 +227,31 @@ impl AxisChannel {
 
     /// A position that the axis cannot have come to stops it: what goes by it would be as wrong.
     fn judge_position(&mut self, now: MonotonicTime, system: SystemTime, sampled: MonotonicTime) {
-        // A drive that seeks its reference or starts up may count from another place at any moment.
-        let settled = self.procedure.selection().is_none() && self.state() != DriveState::NotReady;
+        let settled = self.is_settled();
         if let Some(jump) = self.supervision.jump(&self.feedback, sampled, settled) {
             self.raise(now, system, Fault::new(FaultCause::FEEDBACK_DATA_LOSS, system));
             self.faults.note_jump(system, jump);
+            self.totals.restart_position();
         }
+    }
+
+    /// Whether positions go on from the last one: a drive that seeks its reference or starts up may count from another place at any
+    /// moment.
+    fn is_settled(&self) -> bool {
+        self.procedure.selection().is_none() && self.state() != DriveState::NotReady
+    }
+
+    /// Counts what the axis has done in this cycle.
+    fn count(&mut self, sampled: MonotonicTime) {
+        let position = self.feedback.get(Signal::PositionActual).map(Position);
+        self.totals.sample(&Sample {
+            at: sampled,
+            running: self.state() == DriveState::Operating,
+            position: position.filter(|_| self.is_settled()),
+            velocity: self.feedback.get(Signal::VelocityActual).map(Velocity),
+            torque: self.feedback.get(Signal::TorqueActual).map(Torque),
+            turns_per_unit: self.south().and_then(DriveProgram::motor_turns_per_unit),
+        });
     }
 
     /// Whether the axis may be moving.
@@ -399,6 +422,7 @@ impl AxisChannel {
         self.faults.end_all(Origin::Drive, |_| false);
         self.faults.end_all(Origin::Warning, |_| false);
         self.supervision.restart();
+        self.totals.restart_position();
         self.report(now, system, report);
         self.link.disconnect();
         self.captures.restart();

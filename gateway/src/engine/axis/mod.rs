@@ -26,6 +26,7 @@
 //! | [`hookup`], [`capture`], [`procedure`] | tests, captured positions, procedures that the drive carries out |
 
 pub mod capture;
+mod counters;
 mod cycle;
 mod diagnosis;
 mod diagnostic_message;
@@ -58,6 +59,7 @@ mod user_limits;
 mod velocimeter;
 mod waiting;
 
+pub use self::counters::Totals;
 pub use self::diagnostic_message::DiagnosticMessage;
 pub use self::feed_forward::FeedForward;
 pub use self::guard::Trip;
@@ -90,6 +92,7 @@ use crate::engine::access::{Access, AccessFailure, Progress};
 use crate::mapping::Item;
 
 use self::capture::{CaptureAccess, CaptureUnit};
+use self::counters::Counters;
 use self::diagnosis::{Diagnosis, Shows};
 use self::faults::Faults;
 use self::hookup::HookupUnit;
@@ -201,6 +204,8 @@ pub struct AxisChannel {
     nameplate: nameplate::NameplateCheck,
     /// How warm it is by its load.
     heats: heat::Heats,
+    /// What it has done in its life.
+    totals: Counters,
 }
 
 /// The generic state machine.
@@ -239,6 +244,7 @@ impl AxisChannel {
             slow: slow_values::SlowValues::default(),
             nameplate: nameplate::NameplateCheck::default(),
             heats: heat::Heats::default(),
+            totals: Counters::default(),
         }
     }
 
@@ -325,6 +331,10 @@ impl AxisChannel {
             Parameter::MOTOR_USE => Some(self.heats.motor.millionths()),
             Parameter::DRIVE_USE => Some(self.heats.drive.millionths()),
             Parameter::HEARD_TIME => Some(self.supervision.heard_for().0),
+            Parameter::MOTOR_ENCODER_SHOWN => Some(1),
+            Parameter::COUNTED_RUN_TIME => Some(self.totals().run_time.0),
+            Parameter::COUNTED_WORK => Some(self.totals().motor_work),
+            Parameter::COUNTED_TURNS => Some(self.totals().motor_turns),
             _ => None,
         }
     }
@@ -354,6 +364,17 @@ impl AxisChannel {
             saturated: self.set_points.saturated.saturating_add(self.link.saturated),
             faults: self.faults.count(),
         }
+    }
+
+    /// What it has done in its life, as far as gateways have counted it.
+    #[must_use]
+    pub fn totals(&self) -> Totals {
+        self.totals.totals()
+    }
+
+    /// Sets what was counted before; to be called before the first cycle.
+    pub fn begin_totals(&mut self, totals: Totals) {
+        self.totals.begin_with(totals);
     }
 
     /// What the axis waits for; `None` when it does what it was told, or has nothing to do.
@@ -663,5 +684,6 @@ impl AxisChannel {
     fn restart_position(&mut self) {
         self.link.restart_position();
         self.supervision.restart_plausibility();
+        self.totals.restart_position();
     }
 }

@@ -171,5 +171,7 @@ pub fn needs(axis: &Axis, bus: &Can, drive: &CanDrive) -> Cia402Axis {
         left_out: drive.left_out.clone(),
         offsets: drive.offsets.clone(),
         captures: axis.events,
+        feedback: axis.feedback,
+        only_looks: axis.function != AxisFunction::Drive,
     }
 }

@@ -39,7 +39,7 @@ use super::{Engine, Parts};
 use crate::config::{Axis, AxisFunction, AxisKind, Config, Device, DriveAt, StoppingAction, TimeSource};
 use crate::eds;
 use crate::latest::{self, Reader};
-use crate::mapping::{CipProgram, CipScaling, Mapping};
+use crate::mapping::{CipProgram, CipScaling, FeedbackUse, Mapping};
 use crate::north::{AdapterEnd, motion_link};
 use crate::status::BoxStatus;
 
@@ -154,6 +154,7 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
             scaling: scaling(axis),
             program: programs[*number].clone(),
             stops: stop_defaults(axis),
+            feedback: axis.feedback,
         };
         let configs: Vec<_> = members.iter().map(member).collect();
         let number = u8::try_from(number).unwrap_or(u8::MAX);
@@ -288,6 +289,8 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<(AxisChannel, CipProgram), 
     channel.set_count(program.count());
     let mut data = axis.nameplate.0.clone();
     data.push((Parameter::POWER_STRUCTURE_AXIS_ID, axis.power_structure_axis_id.into()));
+    let is_of_load = axis.function == AxisFunction::Encoder && axis.feedback == FeedbackUse::Load;
+    data.push((Parameter::FEEDBACK_MASTER, if is_of_load { 2 } else { 1 }));
     channel.set_data(data);
     Ok((channel, program))
 }
@@ -370,7 +373,7 @@ fn device_config(
         },
         // Position, velocity and torque; nothing can be enabled that is no drive.
         control_modes: if axis.function == AxisFunction::Drive { 1 << 1 | 1 << 2 | 1 << 4 } else { 0 },
-        feedback_modes: mapping.cip.feedback_modes,
+        feedback_modes: mapping.cip.feedback_modes(axis.feedback),
         lint_position: true,
         // Motor and feedback, feedback; a drive shows the box neither its marker nor its phasing.
         hookup_tests: 0b11,

@@ -91,5 +91,6 @@ pub fn needs(axis: &Axis, drive: &Drive) -> SercosAxis {
         silent: !drive.acknowledges,
         parameters: parameters(axis),
         captures: axis.events,
+        feedback: axis.feedback,
     }
 }

@@ -458,8 +458,7 @@ impl Accessed<'_> {
         notice: &mut dyn FnMut(Notice),
     ) -> Result<(), GeneralStatus> {
         let program = self.axis.south().ok_or(GeneralStatus::DEVICE_STATE_CONFLICT)?;
-        let known = program.mechanics.and_then(|mechanics| Some((mechanics, mechanics.value(fact)?)));
-        let (mechanics, value) = known.ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        let (mechanics, value) = program.mechanical(fact).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
         let agrees = |bytes: &[u8]| entry.number(bytes).is_some_and(|number| mechanics.agrees(fact, number));
         match &access.operation {
             AccessOperation::Write(bytes) if agrees(bytes) => self.keep(access),

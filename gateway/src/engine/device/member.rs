@@ -17,7 +17,7 @@ use super::scaling::{Scaling, signal_octets};
 use super::stopping::{Settings, StopDefaults, Stopping};
 use crate::engine::axis::{AxisChannel, Owner, Reactions, Updates};
 use crate::engine::notice::Notice;
-use crate::mapping::{CipProgram, CipScaling, Mapping};
+use crate::mapping::{CipProgram, CipScaling, FeedbackUse, Mapping};
 
 /// What a device has to know of one of its axes.
 #[derive(Debug)]
@@ -30,6 +30,8 @@ pub struct MemberConfig {
     pub program: CipProgram,
     /// What a stop falls back to.
     pub stops: StopDefaults,
+    /// Whose encoder its position and velocity are of.
+    pub feedback: FeedbackUse,
 }
 
 /// One axis of the device.
@@ -66,7 +68,7 @@ impl Member {
             axis: config.axis,
             cip: CipAxis::new(config.program),
             state: AxisState::Off,
-            scaling: Scaling::new(mapping, config.scaling)?,
+            scaling: Scaling::new(mapping, config.scaling, config.feedback)?,
             stopping: Stopping::new(config.stops),
             accesses: Accesses::default(),
             node_fault: None,

@@ -9,7 +9,8 @@ use profile_cip::wire::status::GeneralStatus;
 use super::axis::CipAxis;
 use crate::engine::axis::AxisChannel;
 use crate::mapping::{
-    AttributeTable, Backing, CipScaling, CipScalingError, CipTables, CipType, DisplacementUnit, Mapping,
+    AttributeTable, Backing, CipScaling, CipScalingError, CipTables, CipType, DisplacementUnit,
+    FeedbackChannel, FeedbackUse, Mapping, MechanicalFact, Number,
 };
 
 /// Attributes that describe the scaling of an axis.
@@ -27,6 +28,12 @@ pub enum ScalingRefusal {
     /// The axis still has torque.
     #[error("the axis still has torque")]
     Energized,
+    /// Positions and velocities would count in different units.
+    #[error(
+        "with Dual Feedback and Control Scaling velocities count in turns of the motor and positions in those of the load: expected a \
+         Feedback Unit Ratio of 1, or Drive Scaling"
+    )]
+    TwoUnits,
 }
 
 /// The scaling of one axis, and its attributes in that scaling.
@@ -40,13 +47,15 @@ pub(super) struct Scaling {
     is_taken: bool,
     /// The device does the scaling, not the controller.
     by_device: bool,
+    /// Whose encoder positions and velocities are of.
+    feedback: FeedbackUse,
 }
 
 impl Scaling {
     /// The scaling of the configuration; `None` if it cannot be expressed exactly.
-    pub fn new(mapping: &Mapping, configured: CipScaling) -> Option<Self> {
+    pub fn new(mapping: &Mapping, configured: CipScaling, feedback: FeedbackUse) -> Option<Self> {
         let attributes = mapping.attribute_table(&configured)?;
-        Some(Self { used: configured, configured, attributes, is_taken: false, by_device: true })
+        Some(Self { used: configured, configured, attributes, is_taken: false, by_device: true, feedback })
     }
 
     /// The attributes in the scaling that is in use.
@@ -97,6 +106,14 @@ impl Scaling {
         };
         let rows = &mapping.cip.scaling;
         self.by_device = number(rows.configuration) == i64::from(rows.drive_scaling);
+        if !self.by_device && self.feedback == FeedbackUse::Dual && !is_direct(axis.1) {
+            return Err(ScalingRefusal::TwoUnits);
+        }
+        // Positions that are the load's count as its encoder does (Table 5-2.8).
+        let is_of_load = self.feedback != FeedbackUse::Motor;
+        let of_encoder = |id| id == rows.feedback_unit || rows.feedback_resolution.contains(&id);
+        let number =
+            |id| number(if is_of_load && of_encoder(id) { id + FeedbackChannel::Two.offset() } else { id });
         let scaling = CipScaling::from_attributes(&mapping.cip, number)?;
         self.apply(mapping, axis, scaling)?;
         self.is_taken = true;
@@ -121,6 +138,12 @@ impl Scaling {
         self.used = scaling;
         Ok(())
     }
+}
+
+/// Whether the encoder of the load is known to turn as the motor's does.
+fn is_direct(axis: &AxisChannel) -> bool {
+    let ratio = axis.south().and_then(|program| program.mechanical(MechanicalFact::UnitRatio));
+    ratio.is_some_and(|(_, ratio)| ratio == Number::Real(1.0))
 }
 
 /// The attributes that describe a scaling, with their values.
@@ -230,7 +253,7 @@ mod tests {
     #[test]
     fn controllers_scaling_is_used_as_soon_as_it_is_taken() {
         let mapping = Mapping::embedded().expect("the shipped tables are sound");
-        let mut scaling = Scaling::new(&mapping, CONFIGURED).expect("exact");
+        let mut scaling = Scaling::new(&mapping, CONFIGURED, FeedbackUse::Motor).expect("exact");
         assert!(!scaling.is_taken());
         assert_eq!(take(&mut scaling, &mapping, &OTHER), Ok(()));
         assert_eq!((scaling.used, scaling.is_taken(), scaling.by_device), (OTHER, true, true));
@@ -239,7 +262,7 @@ mod tests {
     #[test]
     fn scaling_without_resolution_is_refused_and_the_last_one_stays() {
         let mapping = Mapping::embedded().expect("the shipped tables are sound");
-        let mut scaling = Scaling::new(&mapping, CONFIGURED).expect("exact");
+        let mut scaling = Scaling::new(&mapping, CONFIGURED, FeedbackUse::Motor).expect("exact");
         let refused = take(&mut scaling, &mapping, &CipScaling { counts_per_unit: 0, ..OTHER });
         assert!(matches!(refused, Err(ScalingRefusal::Attributes(_))), "{refused:?}");
         assert_eq!((scaling.used, scaling.is_taken()), (CONFIGURED, false));
@@ -248,7 +271,7 @@ mod tests {
     #[test]
     fn scaling_of_an_axis_with_torque_is_not_replaced() {
         let mapping = Mapping::embedded().expect("the shipped tables are sound");
-        let mut scaling = Scaling::new(&mapping, CONFIGURED).expect("exact");
+        let mut scaling = Scaling::new(&mapping, CONFIGURED, FeedbackUse::Motor).expect("exact");
         let mut cip = CipAxis::new(mapping.cip_program(&CONFIGURED).expect("exact"));
         let mut axis = AxisChannel::new(Limits::default(), Reaction::HoldPosition, true);
         axis.report(MonotonicTime(1), SystemTime(1), Report::Ready);
@@ -260,6 +283,32 @@ mod tests {
         // The scaling that is in use already needs no change.
         let same = take_for(&mut scaling, &mapping, &CONFIGURED, (&mut cip, &mut axis));
         assert_eq!((same, scaling.is_taken()), (Ok(()), true));
+    }
+
+    /// Control Scaling of an axis of the load: encoder 1 has 1000 counts in a turn, encoder 2 4000. A dual one needs to know its gear.
+    #[test]
+    fn control_scaling_counts_as_the_encoder_does_that_positions_are_of() {
+        let mapping = Mapping::embedded().expect("the shipped tables are sound");
+        let rows = &mapping.cip.scaling;
+        let mut attributes = BTreeMap::from([(rows.configuration, [0; 8])]);
+        for (offset, counts) in [(0, 1_000_i64), (FeedbackChannel::Two.offset(), 4_000)] {
+            attributes.insert(rows.feedback_unit + offset, [0; 8]);
+            attributes.insert(rows.feedback_resolution[0] + offset, counts.to_le_bytes());
+            attributes.insert(rows.feedback_resolution[1] + offset, 1_i64.to_le_bytes());
+        }
+        let get =
+            |id| attributes.get(&id).map(|value| &value[..]).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
+        for (feedback, expected) in [
+            (FeedbackUse::Motor, Ok(1_000)),
+            (FeedbackUse::Load, Ok(4_000)),
+            (FeedbackUse::Dual, Err(ScalingRefusal::TwoUnits)),
+        ] {
+            let mut scaling = Scaling::new(&mapping, CONFIGURED, feedback).expect("exact");
+            let mut cip = CipAxis::new(mapping.cip_program(&CONFIGURED).expect("exact"));
+            let mut axis = AxisChannel::new(Limits::default(), Reaction::HoldPosition, true);
+            let taken = scaling.take(&mapping, (&mut cip, &mut axis), get);
+            assert_eq!(taken.map(|()| scaling.used.counts_per_unit), expected, "{feedback:?}");
+        }
     }
 
     #[test]

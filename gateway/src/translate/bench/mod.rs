@@ -28,7 +28,7 @@ use profile_cip::device::axis_state::AxisState;
 use profile_cip::device::motion_link::{ExplicitReply, MotionReply, MotionRequest, Token};
 use profile_cip::wire::class1::Class1Datagram;
 use profile_cip::wire::motion::codes::{
-    AxisControl, AxisStateCode, ControlMode, NodeControl, NodeFault, NodeStatus,
+    AxisControl, AxisStateCode, ControlMode, FeedbackMode, NodeControl, NodeFault, NodeStatus,
 };
 use profile_cip::wire::motion::fixed::FixedActual;
 use profile_cip::wire::motion::id_list::IdStatusList;
@@ -49,7 +49,7 @@ use crate::engine::build::{Built, Commissioners, Host, build};
 use crate::engine::notice::Notice;
 use crate::engine::port::{Datagram, NorthPort, SouthPort};
 use crate::mapping::devicenet::{MODE_AT, motion};
-use crate::mapping::{Item, Mapping};
+use crate::mapping::{FeedbackUse, Item, Mapping};
 use crate::north::AdapterEnd;
 use crate::simulate::drives::SIMULATED_MAC;
 
@@ -188,6 +188,8 @@ struct Member {
     bus: usize,
     /// Whether it may be switched on.
     moves: bool,
+    /// The Feedback Mode that it can be switched on with.
+    feedback: FeedbackMode,
     /// Whether a frame has said what its drive shows.
     heard: bool,
     kind: Kind,
@@ -284,6 +286,7 @@ impl Bench {
                     place,
                     bus: engine.buses().of(*axis),
                     moves: config.axes[*axis].function == AxisFunction::Drive,
+                    feedback: feedback_mode(engine.mapping(), config.axes[*axis].feedback),
                     heard: false,
                     kind: Kind::Values,
                 });
@@ -555,13 +558,13 @@ impl Bench {
     // ---- north ------------------------------------------------------------------------------------------------
 
     /// Hands the blocks of an update to a device; what each of these axes is told at the instant at which they count. Those in
-    /// `motor_feedback` get the Feedback Mode of the motor.
+    /// `other_feedback` get that Feedback Mode.
     pub fn update(
         &mut self,
         device: usize,
         update: Update<'_>,
         places: &[usize],
-        motor_feedback: &[usize],
+        other_feedback: &[(usize, FeedbackMode)],
     ) -> Vec<Told> {
         self.used = true;
         if !update.is_valid() {
@@ -588,9 +591,9 @@ impl Bench {
                 (controller.commands, controller.node_control) = (true, controller::CONTROLS);
             }
         }
-        for place in motor_feedback {
+        for (place, feedback) in other_feedback {
             if let Some(said) = controller.said.get_mut(*place) {
-                said.block.feedback_mode = MOTOR_FEEDBACK;
+                said.block.feedback_mode = *feedback;
             }
         }
         let axes: Vec<usize> =
@@ -677,6 +680,11 @@ impl Bench {
         self.run_for(device, 2);
     }
 
+    /// The Feedback Mode that an axis can be switched on with.
+    pub fn feedback_mode(&self, axis: usize) -> FeedbackMode {
+        self.members[axis].feedback
+    }
+
     fn is_faulted(&self, axis: usize) -> bool {
         let Member { device, place, .. } = self.members[axis];
         let motion = self.engine.devices()[device].device();
@@ -736,7 +744,7 @@ impl Bench {
             Some(OperatingMode::Torque) => CommandValues { torque: Some(0.0), ..CommandValues::default() },
             _ => CommandValues { position: Some(position), ..CommandValues::default() },
         };
-        CommandBlock { control_mode, values, ..at_rest() }
+        CommandBlock { control_mode, feedback_mode: self.members[axis].feedback, values, ..at_rest() }
     }
 
     /// Lets so many updates of a device go by.
@@ -984,6 +992,12 @@ pub(super) enum Update<'u> {
     Fixed(CommandBlock, NodeControl),
     /// The block of the axis at a place of the device, in the format of the device.
     Block(usize, CommandBlock),
+}
+
+/// The Feedback Mode that an axis can be switched on with.
+fn feedback_mode(mapping: &Mapping, feedback: FeedbackUse) -> FeedbackMode {
+    let modes = mapping.cip.feedback_modes(feedback);
+    u8::try_from(modes.trailing_zeros()).ok().filter(|_| modes != 0).map_or(MOTOR_FEEDBACK, FeedbackMode)
 }
 
 /// The answer of a CIP Motion drive on DeviceNet that shows this, with the response to what it was told.

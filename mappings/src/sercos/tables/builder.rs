@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use profile_cip::device::exception::ExceptionAction;
+use profile_generic::image::Signal;
 use profile_generic::mode::{InterpolationSource, ModeSelection};
 use profile_generic::program::{BitPattern, MAX_STATE_ROWS};
 use profile_generic::quantity::Quantity;
@@ -22,9 +23,9 @@ use crate::drive_rows::{
 use crate::finding::registry as code;
 use crate::finding::{Findings, Spanned};
 use crate::format::{
-    CommissionRow, DiagnosisRow, FieldIs, FieldValueRow, GenericSercosFile, Name, PolarityRow, ProcedureRow,
-    ScalingMethodRow, SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow, SercosScalingRow,
-    SercosSignalRow, UnboundRow,
+    CommissionRow, DiagnosisRow, FieldIs, FieldValueRow, GenericSercosFile, LoadSignalRow, Name, PolarityRow,
+    ProcedureRow, ScalingMethodRow, SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow,
+    SercosScalingRow, SercosSignalRow, UnboundRow,
 };
 use crate::generic_names::{
     action, capture_kind, cause_and_reaction, interpolation, operating_mode, report, status_bit, unit_kind,
@@ -296,7 +297,17 @@ impl<'a> Builder<'a> {
         }
         once(&mut self.resolver, self.tables.signal(signal).is_some(), "signal", &row.signal);
         let polarity = row.polarity.as_ref().and_then(|row| self.polarity(row));
-        self.tables.signals.push(SignalRule { signal, idn: idn.idn, refuse, polarity });
+        let load = row.load.as_ref().and_then(|row| self.load_signal(signal, row));
+        self.tables.signals.push(SignalRule { signal, idn: idn.idn, refuse, polarity, load });
+    }
+
+    fn load_signal(&mut self, signal: Signal, row: &LoadSignalRow) -> Option<(Idn, Option<Polarity>)> {
+        let idn = self.idn("load", &row.idn)?;
+        if !self.measures(idn, signal.quantity()) {
+            let message = format!("the unit of {} is not a unit of {}", idn.idn, signal.quantity());
+            self.resolver.error(code::UNIT, row.idn.span(), "load", message);
+        }
+        Some((idn.idn, row.polarity.as_ref().and_then(|row| self.polarity(row))))
     }
 
     /// Whether the unit of an IDN can become the quantity.
@@ -314,14 +325,20 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn mode(&mut self, row: &SercosModeRow) {
-        let head = mode_row(&mut self.resolver, &row.mode, row.interpolation.as_ref(), &row.missing);
-        let mut codes = Vec::with_capacity(row.codes.len());
-        for name in &row.codes {
+    fn mode_codes(&mut self, key: &'static str, names: &[Name]) -> Vec<u16> {
+        let mut codes = Vec::with_capacity(names.len());
+        for name in names {
             let code =
-                self.dictionaries.sercos.code_or_error("Operation mode", "codes", name, &mut self.resolver);
+                self.dictionaries.sercos.code_or_error("Operation mode", key, name, &mut self.resolver);
             codes.extend(code.and_then(|code| u16::try_from(code).ok()));
         }
+        codes
+    }
+
+    fn mode(&mut self, row: &SercosModeRow) {
+        let head = mode_row(&mut self.resolver, &row.mode, row.interpolation.as_ref(), &row.missing);
+        let codes = self.mode_codes("codes", &row.codes);
+        let load_codes = self.mode_codes("load_codes", &row.load_codes);
         if codes.is_empty() {
             self.resolver.error(
                 code::MISSING_KEY,
@@ -336,7 +353,7 @@ impl<'a> Builder<'a> {
         if let Some((selection, optional)) = head {
             let known = self.tables.modes.iter().any(|known| known.selection == selection);
             once(&mut self.resolver, known, "mode", &row.mode);
-            self.tables.modes.push(ModeRule { selection, optional, codes, command, actual });
+            self.tables.modes.push(ModeRule { selection, optional, codes, load_codes, command, actual });
         }
     }
 

@@ -17,6 +17,7 @@ use super::scaling::ScalingRule;
 use crate::dictionary::{Dictionaries, IdnUnit};
 use crate::drive_program::FaultRow;
 use crate::drive_rows::FixedUnit;
+use crate::feedback::FeedbackUse;
 
 #[derive(Debug, Clone)]
 pub(crate) struct SignalRule {
@@ -26,6 +27,8 @@ pub(crate) struct SignalRule {
     pub refuse: bool,
     /// The bit by which the drive inverts it.
     pub polarity: Option<Polarity>,
+    /// The same by the encoder of the load.
+    pub load: Option<(Idn, Option<Polarity>)>,
 }
 
 /// A bit of a polarity parameter.
@@ -41,6 +44,8 @@ pub(crate) struct ModeRule {
     /// Whether an axis can do without it.
     pub optional: bool,
     pub codes: Vec<u16>,
+    /// Those for the encoder of the load; none where it does not matter to the mode.
+    pub load_codes: Vec<u16>,
     pub command: Vec<Signal>,
     pub actual: Vec<Signal>,
 }
@@ -160,6 +165,31 @@ pub struct SercosTables {
 }
 
 impl SercosTables {
+    /// The tables for axes with this use of their encoders.
+    pub(crate) fn for_feedback(&self, feedback: FeedbackUse) -> Self {
+        let mut tables = self.clone();
+        if feedback == FeedbackUse::Motor {
+            return tables;
+        }
+        for mode in tables.modes.iter_mut().filter(|mode| !mode.load_codes.is_empty()) {
+            mode.codes.clone_from(&mode.load_codes);
+        }
+        if feedback == FeedbackUse::Load {
+            // That of the motor is not meant, and no source has the unit of the load's: the gateway derives it from positions.
+            tables.modes.iter_mut().for_each(|mode| mode.actual.retain(|of| *of != Signal::VelocityActual));
+        }
+        for rule in &mut tables.signals {
+            if let Some((idn, polarity)) = rule.load {
+                (rule.idn, rule.polarity) = (idn, polarity);
+                if rule.signal == Signal::PositionActual {
+                    // The axis goes the way of its actual position.
+                    tables.direction = polarity.or(tables.direction);
+                }
+            }
+        }
+        tables
+    }
+
     pub(crate) fn signal(&self, signal: Signal) -> Option<&SignalRule> {
         self.signals.iter().find(|rule| rule.signal == signal)
     }

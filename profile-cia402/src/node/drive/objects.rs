@@ -241,6 +241,12 @@ pub fn define(dictionary: &mut Dictionary, axis: u8, servo: &ServoParameters) {
             ],
         ),
     ];
+    for (index, name) in [
+        (ADDITIONAL_POSITION_ACTUAL, "Additional position actual value"),
+        (ADDITIONAL_VELOCITY_ACTUAL, "Additional velocity actual value"),
+    ] {
+        dictionary.record(index + offset, name, Shape::Array, &[part(actual(name, I32))]);
+    }
     for (index, name, shape, parts) in records {
         dictionary.record(index + offset, name, shape, parts);
     }

@@ -141,9 +141,16 @@ pub(super) const fn mode_of(code: u16) -> Option<OperatingMode> {
     match code {
         0x0001 => Some(OperatingMode::Torque),
         0x0002 => Some(OperatingMode::Velocity),
-        0x0003 | 0x000B | 0x0013 | 0x001B => Some(OperatingMode::Position),
+        0x0003 | 0x000B | 0x0013 | 0x001B | 0x0004 | 0x000C | 0x0014 | 0x001C => {
+            Some(OperatingMode::Position)
+        }
         _ => None,
     }
+}
+
+/// Whether the position loop is closed over feedback 2 in an operation mode.
+pub(super) const fn is_by_load(code: u16) -> bool {
+    code & 0b111 == 0b100
 }
 
 #[cfg(test)]
@@ -181,5 +188,7 @@ mod tests {
         assert_eq!(mode_of(0x0001), Some(OperatingMode::Torque));
         assert!(MODES.iter().all(|&code| mode_of(code).is_some()));
         assert_eq!(mode_of(0x0005), None);
+        let by_load: Vec<u16> = MODES.into_iter().filter(|code| is_by_load(*code)).collect();
+        assert_eq!(by_load, [0x0004, 0x000C, 0x0014, 0x001C]);
     }
 }

@@ -79,6 +79,8 @@ pub struct Drive {
     memory: Memory,
     /// Time does not pass for motor and loops.
     paused: bool,
+    /// How far the encoder of the load (feedback 2) is ahead of the motor's, nanounits.
+    slip: i64,
     /// The parameters of the drive that it is like, until its own are made.
     given: Option<Vec<Given>>,
 }
@@ -105,6 +107,7 @@ impl Drive {
             homing: Homing::default(),
             memory: Memory::default(),
             paused: false,
+            slip: 0,
             given: None,
         })
     }
@@ -194,6 +197,16 @@ impl Drive {
     /// How long it takes to store parameters (S-0-0264), and whether that fails in the end.
     pub fn set_memory(&mut self, time: DurationNs, is_broken: bool) {
         (self.memory.time, self.memory.is_broken) = (time, is_broken);
+    }
+
+    /// The load is this far ahead of the motor, as after a slip of its coupling: feedback 2 shows it.
+    pub fn set_slip(&mut self, slip: Position) {
+        self.slip = slip.0;
+    }
+
+    /// How far the encoder of the position loop is ahead of the motor's.
+    fn loop_slip(&self) -> i64 {
+        if control::is_by_load(self.mode.code) { self.slip } else { 0 }
     }
 
     /// How long it takes to another operation mode.

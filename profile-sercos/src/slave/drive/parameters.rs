@@ -12,7 +12,7 @@ const FSP_DRIVE: i64 = 2;
 
 /// Operation modes: torque, velocity, position with and without following distance, the same with drive-controlled
 /// interpolation.
-pub const MODES: [u16; 6] = [0x0001, 0x0002, 0x0003, 0x000B, 0x0013, 0x001B];
+pub const MODES: [u16; 10] = [0x0001, 0x0002, 0x0003, 0x000B, 0x0013, 0x001B, 0x0004, 0x000C, 0x0014, 0x001C];
 
 /// S-0-0038: positive velocity limit value.
 pub const POSITIVE_VELOCITY_LIMIT: Idn = Idn::standard(38);

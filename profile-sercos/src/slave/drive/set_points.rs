@@ -53,12 +53,13 @@ impl Drive {
         let mut command =
             ServoCommand { control, power: self.control.main_power, mode, ..ServoCommand::default() };
         if let Some(position) = self.lead(cycle, able, mode, store) {
-            self.path.position = self.scales.position.counts(position);
+            self.path.position = self.scales.position.counts(position.saturating_add(self.loop_slip()));
             command.position = Position(position);
             command.mode = OperatingMode::Position;
             return command;
         }
-        let actual = self.scales.position.counts(self.actual.position.0);
+        let slip = self.loop_slip();
+        let actual = self.scales.position.counts(self.actual.position.0.saturating_add(slip));
         self.path.motion = Motion { position: self.actual.position.0, velocity: self.actual.velocity.0 };
         if !self.control.follows {
             // Command values do not count: the drive stands where it is.
@@ -78,8 +79,9 @@ impl Drive {
         // Position commands begin where the drive is, whatever way it has gone without them.
         self.path.position = if mode == OperatingMode::Position { whole } else { actual };
         let additive = sign(Idn::POSITION_POLARITY_PARAMETERS, 1) * number(Idn::ADDITIVE_POSITION_COMMAND);
-        command.position =
-            Position(self.scales.position.generic(self.path.position.saturating_add(additive)));
+        let position = self.scales.position.generic(self.path.position.saturating_add(additive));
+        // The loop of the servo is closed over the motor: what the load is ahead, the motor stays behind.
+        command.position = Position(position.saturating_sub(slip));
         let velocity = |value| Velocity(self.scales.velocity.generic(value));
         command.velocity =
             velocity(sign(Idn::VELOCITY_POLARITY_PARAMETER, 0) * number(Idn::VELOCITY_COMMAND));
@@ -121,8 +123,10 @@ impl Drive {
         }
         let number = |idn| store.number_of(idn);
         let sign = if number(Idn::POSITION_POLARITY_PARAMETERS) & 1 == 0 { 1 } else { -1 };
-        let here = scales.position.counts(self.path.motion.position);
+        let slip = self.loop_slip();
+        let here = scales.position.counts(self.path.motion.position.saturating_add(slip));
         let target = scales.position.generic(scales.unfold(sign * number(Idn::TARGET_POSITION), here));
+        let target = target.saturating_sub(slip);
         // 0.01 %.
         let velocity = scales.velocity.generic(number(Idn::POSITIONING_VELOCITY).abs());
         let velocity = velocity / 10_000 * number(Idn::FEEDRATE_OVERRIDE)
@@ -147,7 +151,8 @@ impl Drive {
         self.actual.position = moved(self.actual.position);
         self.path.next.position = moved(self.path.next.position);
         self.path.motion.position = self.path.motion.position.saturating_add(shift);
-        self.path.position = self.scales.position.counts(self.actual.position.0);
+        let place = self.actual.position.0.saturating_add(self.loop_slip());
+        self.path.position = self.scales.position.counts(place);
         self.homing.shifted(shift);
         self.referenced = true;
     }

@@ -7,7 +7,7 @@ use profile_generic::scaling::UnitKind;
 use profile_generic::state::Report;
 
 use super::parameters::{DC_BUS_CURRENT, DC_BUS_POWER, MOTOR_SHUT_DOWN_TEMPERATURE};
-use super::{Drive, fault, scaling};
+use super::{Drive, control, fault, scaling};
 use crate::slave::application::{Cycle, Diagnosis};
 use crate::slave::parameter::Store;
 use crate::slave::phase::State;
@@ -46,12 +46,13 @@ impl Drive {
         let actual = &self.actual;
         let number = |store: &Store, idn| store.number_of(idn);
         let sign = |store: &Store, idn, bit: i64| if number(store, idn) & 1 << bit == 0 { 1 } else { -1 };
-        let counts = self.scales.position.counts(actual.position.0);
-        for (idn, bit) in [
-            (Idn::POSITION_FEEDBACK_VALUE_1, 2),
-            (Idn::POSITION_FEEDBACK_VALUE_2, 3),
-            (Idn::ACTIVE_POSITION_FEEDBACK, 2),
+        let active = if control::is_by_load(self.mode.code) { 3 } else { 2 };
+        for (idn, bit, slip) in [
+            (Idn::POSITION_FEEDBACK_VALUE_1, 2, 0),
+            (Idn::POSITION_FEEDBACK_VALUE_2, 3, self.slip),
+            (Idn::ACTIVE_POSITION_FEEDBACK, active, self.loop_slip()),
         ] {
+            let counts = self.scales.position.counts(actual.position.0.saturating_add(slip));
             let polarity = sign(store, Idn::POSITION_POLARITY_PARAMETERS, bit);
             store.set_number_of(idn, self.scales.fold(polarity * counts));
         }

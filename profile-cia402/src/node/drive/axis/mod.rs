@@ -114,6 +114,8 @@ pub struct Axis {
     modes: SupportedModes,
     /// It has the objects of the simulated drive's own manufacturer.
     has_own_objects: bool,
+    /// How far the encoder of the load (60E4h) is ahead of the motor's, nanounits.
+    slip: i64,
 }
 
 impl Axis {
@@ -147,6 +149,7 @@ impl Axis {
             },
             modes: MODES,
             has_own_objects: true,
+            slip: 0,
         })
     }
 
@@ -189,6 +192,11 @@ impl Axis {
     /// Whether the controlword is obeyed: bit 9 of the statusword.
     pub fn set_remote(&mut self, remote: bool) {
         self.wiring.remote = remote;
+    }
+
+    /// The load is this far ahead of the motor, as after a slip of its coupling: the additional encoder shows it.
+    pub fn set_slip(&mut self, slip: Position) {
+        self.slip = slip.0;
     }
 
     /// Holds bits of the statusword at a value whatever the drive does, as makers do who use them for something else.

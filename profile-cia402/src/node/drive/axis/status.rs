@@ -194,6 +194,12 @@ impl Axis {
         for (index, value) in values {
             self.set(dictionary, index, value);
         }
+        let load = scales.position_object(actual.position.0.saturating_add(self.slip));
+        for (index, value) in
+            [(index::ADDITIONAL_POSITION_ACTUAL, load), (index::ADDITIONAL_VELOCITY_ACTUAL, velocity)]
+        {
+            dictionary.set(index + self.offset, 1, value);
+        }
         self.show_status(dictionary);
     }
 
