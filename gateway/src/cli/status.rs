@@ -213,6 +213,8 @@ mod tests {
             inhibits: Vec::new(),
             lost_telegrams: 0,
             faults: 0,
+            run_hours: 0.0,
+            motor_turns: 0.0,
             address: "address 1".to_owned(),
             node: None,
             position_command: None,

@@ -206,7 +206,7 @@ fn markdown(devices: &[Device<'_>]) -> String {
 mod tests {
     use super::*;
 
-    const BOX: &str = include_str!("../../../examples/two-axes-in-process.toml");
+    const BOX: &str = include_str!("../../../../examples/two-axes-in-process.toml");
 
     fn config(assembly: &str) -> Config {
         let text = BOX.replacen("power_structure_class_id = 0", &format!("assembly = {assembly}"), 1);
