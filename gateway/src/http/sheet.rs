@@ -282,7 +282,7 @@ mod tests {
         assert_eq!((&*command.kind, command.field.as_deref()), ("command", Some("position_command")));
         assert!(command.cip.iter().any(|place| place.contains("Position")), "{command:?}");
         assert_eq!(command.drive, ["S-0-0047"]);
-        assert_eq!(row(&can, 1, "position_command").drive, ["607A:00"]);
+        assert_eq!(row(&can, 1, "position_command").drive, ["607A:00", "60C1:01"]);
         let other = row(&devicenet, 0, "position_command");
         assert_eq!(
             (&*other.drive, &other.cip),
