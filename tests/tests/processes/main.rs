@@ -9,7 +9,6 @@ mod init;
 mod local;
 mod package;
 mod param;
-mod recording;
 mod reload;
 mod scripts;
 mod two_clocks;
