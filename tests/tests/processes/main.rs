@@ -9,6 +9,7 @@ mod init;
 mod local;
 mod package;
 mod param;
+mod recording;
 mod reload;
 mod scripts;
 mod two_clocks;
