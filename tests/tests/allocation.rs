@@ -2,16 +2,21 @@
 //! engine alone.
 
 use std::cell::Cell;
-use std::net::SocketAddrV4;
+use std::net::{Ipv4Addr, SocketAddrV4};
 use std::rc::Rc;
 
 use allocation_counter::{measure, opt_out};
+use axisbridge::capture::Side;
+use axisbridge::capture::reader::Reader;
+use axisbridge::capture::recorder::{Interfaces, Recorder};
 use axisbridge::config::Config;
 use axisbridge::engine::direct::{DirectNorth, DirectRequest, Direction, Target};
 use axisbridge::engine::notice::Notice;
 use axisbridge::mapping::{Mapping, Object, Told};
+use axisbridge::recording::{AttributeNames, ContactDevice, DEPTH, Plan, Recording};
 use axisbridge::simulate::drives::linear;
 use axisbridge::status::BoxState;
+use axisbridge::sys::clock::KernelTime;
 use axisbridge::translate::Stage;
 use axisbridge_tests::can_frames;
 use axisbridge_tests::rig::explicit::Client;
@@ -41,7 +46,9 @@ use profile_generic::quantity::Position;
 use profile_generic::scaling::UnitKind;
 use profile_generic::servo::Marks;
 use profile_generic::state::Action;
+use profile_generic::time::DurationNs;
 use profile_sercos::master::event::Event as SercosEvent;
+use profile_sercos::port::Port;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::{Config as SlaveConfig, Slave};
 use profile_sercos::wire::idn::Idn;
@@ -125,6 +132,50 @@ fn cycles_with_two_axes_in_motion_allocate_nothing() {
     assert_eq!(weigh(&mut rig, 2_000, |_, _| ()), []);
     assert!(rig.engine.axes().iter().all(|axis| axis.counters().commands > 900), "both axes were led");
     assert_eq!(rig.report().steps_finished, 1, "the whole time was inside of the motion");
+}
+
+/// What the cycle does for the rolling recording: a record of each frame into a queue, also when the queue is full.
+#[test]
+fn recording_of_frames_allocates_nothing_where_they_are_seen() {
+    const ROUNDS: u32 = 2_000;
+    let devices = vec![ContactDevice { name: "front".to_owned(), address: Ipv4Addr::new(192, 0, 2, 1) }];
+    let recording = Recording::new(Plan {
+        span: DurationNs::from_secs(10),
+        memory: 2_000_000,
+        interfaces: Interfaces { can: vec!["can0".to_owned()], ..Interfaces::default() },
+        devices,
+        axes: vec![("turntable".to_owned(), 0)],
+        attributes: AttributeNames::default(),
+        buses: vec!["SERCOS".to_owned()],
+        directory: None,
+    });
+    let sink = Some(recording.sink());
+    let (recorder, mut taps) = Recorder::start_with(None, sink, DEPTH, 1).expect("a thread");
+    let tap = &mut taps[0];
+    let (controller, device) = (
+        SocketAddrV4::new(Ipv4Addr::new(192, 0, 2, 10), 2_222),
+        SocketAddrV4::new(Ipv4Addr::new(192, 0, 2, 1), 2_222),
+    );
+    let can = Frame::new(Id::Standard(0x181), &[1, 2, 3]).expect("a frame");
+    let info = measure(|| {
+        for number in 0..ROUNDS {
+            let at = KernelTime(u64::from(number));
+            tap.frame(at, Side::South(Port::One), &[7; 200]);
+            tap.can_frame(at, 0, &can);
+            tap.datagram(at, controller, device, 0, &[1; 100]);
+            tap.datagram(at, device, controller, 0, &[2; 100]);
+        }
+    });
+    assert_eq!(info.count_total, 0);
+    drop(taps);
+    recorder.finish().expect("no file");
+    let file = recording.take(DurationNs::from_secs(10)).expect("a recording");
+    let mut reader = Reader::new(&file[..]).expect("a recording");
+    let mut frames = 0;
+    while reader.next_frame().expect("a frame").is_some() {
+        frames += 1;
+    }
+    assert!((DEPTH..=8_000).contains(&frames), "{frames} were taken");
 }
 
 #[test]

@@ -27,7 +27,7 @@ fn configuration(device: &str, directory: &str) -> String {
 }
 
 /// What a command that is a client of the gateway prints, and its exit status.
-fn ask(gateway: &Gateway, words: &[&str]) -> (Option<i32>, String, String) {
+pub fn ask(gateway: &Gateway, words: &[&str]) -> (Option<i32>, String, String) {
     let mut command = Command::new(axisbridge());
     command.args(words).arg("--local").arg(&gateway.socket).stdin(Stdio::null());
     let output = command.output().expect("the command can be started");
@@ -67,7 +67,7 @@ fn until_file(path: &Path, wanted: &str) -> String {
 }
 
 /// Moves the turntable out of the window that its drive monitors.
-fn provoke(gateway: &Gateway) {
+pub fn provoke(gateway: &Gateway) {
     let mut client = gateway.connect();
     client.until("write turntable S-0-0159 0.0001", "ok write turntable ");
     client.until("enable turntable", "ok enable turntable state=operating ");

@@ -28,7 +28,7 @@ fn configuration(device: &str) -> String {
 }
 
 /// The address in the log.
-fn address(gateway: &Gateway) -> SocketAddr {
+pub fn address(gateway: &Gateway) -> SocketAddr {
     let end = Instant::now() + PATIENCE;
     loop {
         let log = gateway.log();
@@ -41,7 +41,7 @@ fn address(gateway: &Gateway) -> SocketAddr {
     }
 }
 
-fn connect(address: SocketAddr, request: &str) -> TcpStream {
+pub fn connect(address: SocketAddr, request: &str) -> TcpStream {
     let mut stream = TcpStream::connect(address).expect("the gateway listens");
     stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
     let _ = stream.write_all(request.as_bytes());
