@@ -78,7 +78,9 @@ def python(path):
     spec = importlib.util.spec_from_file_location("library", path)
     library = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(library)
-    outputs = [library.AxisOutput(control=0x0102 + place, velocity=-(1 << 24) - place) for place in range(len(library.AXES))]
+    values = [{"control": 0x0102 + place, "velocity": -(1 << 24) - place} for place in range(len(library.AXES))]
+    known = library.AxisOutput._fields
+    outputs = [library.AxisOutput(**{name: value for name, value in one.items() if name in known}) for one in values]
     packed = library.pack_output(outputs)
     shown = library.unpack_input(bytes(at % 251 for at in range(library.INPUT_BYTES)))
     return {"axes": library.AXES, "packed": packed.hex(), "shown": [one._asdict() for one in shown]}

@@ -20,7 +20,7 @@ pub(crate) fn parse(text: &str) -> Option<usize> {
 /// Writes a size in the largest unit that needs no decimals.
 pub(crate) fn show(bytes: usize) -> String {
     for (scale, unit) in [(1_000_000_000, "GB"), (1_000_000, "MB")] {
-        if bytes != 0 && bytes % scale == 0 {
+        if bytes != 0 && bytes.is_multiple_of(scale) {
             return format!("{} {unit}", bytes / scale);
         }
     }

@@ -262,7 +262,7 @@ fn every_path_of_the_description_is_answered_and_no_other() {
     let description: Value = serde_json::from_str(&answer.body).unwrap();
     assert_eq!(description, openapi());
     let paths: Vec<&String> = description["paths"].as_object().unwrap().keys().collect();
-    assert_eq!(paths.len(), 16);
+    assert_eq!(paths.len(), 20);
     for path in paths {
         let needed = match path.as_str() {
             "/api/v1/traces" | "/api/v1/axis" => "?axis=slide",

@@ -124,9 +124,9 @@ struct State {
 
 impl State {
     /// The contacts that have changed; the next ones have time until they are asked for.
-    fn to_save(&mut self) -> Option<Unsaved> {
+    fn take_unsaved(&mut self) -> Option<Unsaved> {
         self.contacts_saved = Some(Instant::now());
-        self.contacts.to_save()
+        self.contacts.take_unsaved()
     }
 }
 
@@ -257,7 +257,7 @@ impl Recording {
     }
 
     fn save_contacts(&self) {
-        let Some((files, changed, kept)) = self.state().to_save() else { return };
+        let Some((files, changed, kept)) = self.state().take_unsaved() else { return };
         if changed.is_empty() {
             return;
         }

@@ -25,6 +25,13 @@ const MOTOR_TURNS: (i64, i64) = (1, 1_000_000_000_000_000_000);
 /// Whether a value beyond an end of `limit` is held at it.
 pub(crate) const AT_LIMIT: [(&str, bool); 2] = [("hold", true), ("none", false)];
 
+/// How a result becomes a whole number.
+pub(crate) const ROUNDINGS: [(&str, Rounding); 3] = [
+    (Rounding::Nearest.name(), Rounding::Nearest),
+    (Rounding::Floor.name(), Rounding::Floor),
+    (Rounding::TowardZero.name(), Rounding::TowardZero),
+];
+
 /// A constant by name.
 #[derive(Debug, Clone)]
 struct Constant {
@@ -154,11 +161,9 @@ impl<'g> RowReader<'_, '_, 'g> {
         let parameter = self.resolver.name("parameter", &row.parameter, what, find, own);
         let ways = self.ways(row);
         let factor = row.factor.as_ref().map_or(Some(Ratio::ONE), |row| self.resolver.ratio("factor", row));
-        let words = [Rounding::Nearest, Rounding::Floor, Rounding::TowardZero];
-        let words = words.map(|rounding| (rounding.name(), rounding));
         let rounding = row.rounding.as_ref();
         let rounding =
-            rounding.map_or(Some(Rounding::Nearest), |name| self.resolver.word("rounding", name, &words));
+            rounding.map_or(Some(Rounding::Nearest), |name| self.resolver.word("rounding", name, &ROUNDINGS));
         let modes: Vec<_> = row.modes.iter().map(|name| operating_mode(self.resolver, name)).collect();
         let modes: Option<Vec<_>> = modes.into_iter().collect();
         self.marked();

@@ -28,7 +28,7 @@ pub use cip_attributes::{Access, CipAttribute, CipType, DEVICE_FUNCTIONS, Polari
 pub use cip_faults::{Clearing, ExceptionAction, FaultRecord, StatusCode};
 pub use cip_networks::{CipNetwork, ConnectionDataFormat, ETHERNET_IP, NetworkObject, networks};
 pub use cip_services::CipService;
-pub(crate) use computed::AT_LIMIT;
+pub(crate) use computed::{AT_LIMIT, ROUNDINGS};
 pub use documents::{Confidence, Document, Documents, Trust};
 pub use generic::{GenericDictionary, GenericParameter};
 pub use sercos::SercosDictionary;

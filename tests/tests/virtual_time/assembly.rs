@@ -308,7 +308,7 @@ fn parameters_of_the_drive_are_attributes_of_a_vendor_object() {
         let [low, high] = attribute.to_le_bytes();
         [0x20, 0x64, 0x24, instance, 0x31, 0, low, high]
     };
-    let mut ask = |plc: &mut Plc, service, path: [u8; 8], data: &[u8]| {
+    let ask = |plc: &mut Plc, service, path: [u8; 8], data: &[u8]| {
         plc.client.request(&mut plc.rig, service, &path, data)
     };
     let held = |plc: &Plc, axis: usize| plc.rig.line.slaves()[axis].store().number_of(Idn::standard(104));

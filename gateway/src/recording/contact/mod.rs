@@ -242,7 +242,7 @@ impl Contacts {
     }
 
     /// What is to be written, and the numbers of the contacts that are still kept.
-    pub fn to_save(&mut self) -> Option<Unsaved> {
+    pub fn take_unsaved(&mut self) -> Option<Unsaved> {
         let files = self.files.clone()?;
         let mut changed = Vec::new();
         for kept in self.opened.iter_mut().chain(&mut self.refused) {

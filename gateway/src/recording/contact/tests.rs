@@ -307,7 +307,7 @@ fn contacts_on_disk_are_those_of_the_next_run() {
     };
     let mut bench = Bench { contacts: open(), ..Bench::new(2_000_000) };
     let save = |contacts: &mut Contacts| {
-        let (files, changed, numbers) = contacts.to_save().unwrap();
+        let (files, changed, numbers) = contacts.take_unsaved().unwrap();
         let count = changed.len();
         for (contact, frames) in changed {
             files.write(&contact, (!frames.is_empty()).then_some(&b"frames"[..])).unwrap();

@@ -10,7 +10,7 @@ use profile_generic::state::{Action, DriveState, Report, Request};
 
 use crate::cip_tables::{MISSING, Times};
 use crate::device_link::DRIVE_ACTIONS;
-use crate::dictionary::AT_LIMIT;
+use crate::dictionary::{AT_LIMIT, ROUNDINGS};
 use crate::dictionary::{
     Access, Cia402Access, Cia402Category, Cia402Kind, Cia402Pdo, Cia402RangeKind, Cia402SetKind, Cia402Type,
     CipType, Clearing, Confidence, GroupKind, IdnFormat, Layout, RangeKind,
@@ -64,7 +64,8 @@ impl Names {
             }
             (_, "parameter") => offered(&self.parameters, WORD),
             (
-                "SercosSignalRow" | "SercosParameterRow" | "ModeSlotRow" | "CommissionRow" | "PolarityRow",
+                "SercosSignalRow" | "LoadSignalRow" | "SercosParameterRow" | "ModeSlotRow" | "CommissionRow"
+                | "PolarityRow",
                 "idn",
             ) => offered(&self.idns, IDN),
             ("SercosStatusRow" | "SercosFaultRow", "word") => offered(&self.words, NAME),
@@ -120,6 +121,7 @@ fn of_builders(row: &str, key: &str) -> Option<Vec<&'static str>> {
         (_, "missing") => named(&REJECTED),
         (_, "refused") => named(&FAILS),
         ("ComputedRow", "at_limit") => named(&AT_LIMIT),
+        ("ComputedRow", "rounding") => named(&ROUNDINGS),
         (_, "interpolation") => vec!["controller", "drive"],
         (_, "voltage_bit") => named(&VOLTAGE_BIT),
         (_, "served_by") => vec!["device", "connection", "stored", "constant", "mechanics"],

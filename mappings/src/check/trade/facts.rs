@@ -746,6 +746,9 @@ pub(super) const ATTRIBUTES: &[(&str, &str)] = &[
     ("Feedback 1 Startup Method", "encoder_startup"),
     ("Feedback 1 Turns", "encoder_turns"),
     ("Feedback 1 Length", "encoder_length"),
+    ("Feedback 2 Unit", "load_feedback_unit"),
+    ("Feedback 2 Cycle Resolution", "load_feedback_resolution"),
+    ("Feedback 2 Cycle Interpolation", "load_feedback_interpolation"),
 ];
 
 /// Bits of S-0-0013 in the telegram, and what they show.
