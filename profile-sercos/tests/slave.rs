@@ -119,7 +119,7 @@ fn application_parameters_are_checked_before_cp4() {
     bench.up_to_cp2();
     bench.configure();
     bench.write(0, Idn::standard(32), 0).unwrap();
-    assert_eq!(bench.write(0, Idn::standard(32), 0x14), Err(SvcError::INVALID_DATA));
+    assert_eq!(bench.write(0, Idn::standard(32), 0x15), Err(SvcError::INVALID_DATA));
     assert_eq!(bench.command(0, Idn::CP3_CHECK), Ok(CommandState::Done));
     bench.switch(Phase::CP3);
     assert_eq!(bench.command(0, Idn::CP4_CHECK), Ok(CommandState::Failed));

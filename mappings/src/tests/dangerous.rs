@@ -15,8 +15,8 @@ const CASES: &[Case] = &[
     (
         "polarity of the actual position removed",
         |t| &mut t.generic_sercos,
-        "polarity = { idn = \"S-0-0055\", bit = 2 }, source = \"Rexroth, Metronix ARS2000, KEBA ServoOne\"",
-        "source = \"Rexroth, Metronix ARS2000, KEBA ServoOne\"",
+        "polarity = { idn = \"S-0-0055\", bit = 2 }, load = ",
+        "load = ",
         code::WRONG_SIGN,
         "signal",
     ),
