@@ -10,7 +10,6 @@ mod local;
 mod package;
 mod page;
 mod param;
-mod recording;
 mod reload;
 mod scripts;
 mod two_clocks;
