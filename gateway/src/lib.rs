@@ -20,6 +20,7 @@ pub mod log_limit;
 pub mod modbus;
 pub mod north;
 pub mod parameter;
+pub mod places;
 pub mod recording;
 mod replace_file;
 pub mod runner;

@@ -18,18 +18,8 @@ const FORMAT: u32 = 1;
 pub fn run(arguments: &ContactsArguments) -> Result<ExitCode, CliError> {
     let mut client = GatewayClient::connect(&arguments.local, PATIENCE)?;
     let reply = client.ask("contacts")?;
-    if !reply.last.starts_with("ok contacts ") {
-        return Err(match reply.last.split_once(": ") {
-            Some((head, text)) if head.starts_with("error ") => text.into(),
-            _ => format!("expected a reply `ok contacts N`, got `{}`", reply.last).into(),
-        });
-    }
-    let contact = |line: &String| -> Result<Contact, CliError> {
-        let json = line.strip_prefix("contact ");
-        let json = json.ok_or_else(|| format!("expected a line `contact {{...}}`, got `{line}`"))?;
-        Ok(serde_json::from_str(json).map_err(|error| format!("unexpected `{line}`: {error}"))?)
-    };
-    let mut contacts = reply.lines.iter().map(contact).collect::<Result<Vec<_>, _>>()?;
+    reply.end("contacts", "ok contacts N")?;
+    let mut contacts: Vec<Contact> = reply.rows("contact")?.into_iter().map(|(_, contact)| contact).collect();
     if let Some(number) = arguments.number {
         contacts.retain(|contact| contact.number == number);
         if contacts.is_empty() {

@@ -20,18 +20,8 @@ pub fn run(arguments: &FaultsArguments) -> Result<ExitCode, CliError> {
     let mut client = GatewayClient::connect(&arguments.local, PATIENCE)?;
     let axis = arguments.axis.as_ref().map(|axis| format!(" {axis}")).unwrap_or_default();
     let reply = client.ask(&format!("faults{axis}"))?;
-    if !reply.last.starts_with("ok faults ") {
-        return Err(match reply.last.split_once(": ") {
-            Some((head, text)) if head.starts_with("error ") => text.into(),
-            _ => format!("expected a reply `ok faults N`, got `{}`", reply.last).into(),
-        });
-    }
-    let record = |line: &String| -> Result<FaultRecord, CliError> {
-        let json = line.strip_prefix("fault ");
-        let json = json.ok_or_else(|| format!("expected a line `fault {{...}}`, got `{line}`"))?;
-        Ok(serde_json::from_str(json).map_err(|error| format!("unexpected `{line}`: {error}"))?)
-    };
-    let history = reply.lines.iter().map(record).collect::<Result<Vec<_>, _>>()?;
+    reply.end("faults", "ok faults N")?;
+    let history: Vec<FaultRecord> = reply.rows("fault")?.into_iter().map(|(_, record)| record).collect();
     let (_, overview) = status::ask(&mut client)?;
     let wanted = |axis: &&Axis| arguments.axis.as_ref().is_none_or(|name| axis.name == *name);
     let present: Vec<&Axis> =

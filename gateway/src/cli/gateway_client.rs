@@ -5,6 +5,8 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::Duration;
 
+use serde::de::DeserializeOwned;
+
 use super::CliError;
 
 /// Longest line of a reply, bytes: a value of 64 KiB is shown as text and as hexadecimal digits.
@@ -36,6 +38,32 @@ impl Reply {
         let last = lines.pop().unwrap_or_default();
         Self { lines, last }
     }
+
+    /// What the last line says after `ok` and this word. `form` is the reply that is expected.
+    pub fn end(&self, word: &str, form: &str) -> Result<&str, CliError> {
+        let end = self.last.strip_prefix("ok ").and_then(|rest| rest.strip_prefix(word));
+        end.and_then(|rest| rest.strip_prefix(' ')).ok_or_else(|| self.unexpected(form))
+    }
+
+    /// The error that this reply is where another form was expected: the gateway's own text, or what came.
+    pub fn unexpected(&self, form: &str) -> CliError {
+        match self.last.split_once(": ") {
+            Some((head, text)) if head.starts_with("error ") => text.into(),
+            _ => format!("expected a reply `{form}`, got `{}`", self.last).into(),
+        }
+    }
+
+    /// The objects of the lines, each behind this word, with their texts.
+    pub fn rows<T: DeserializeOwned>(&self, word: &str) -> Result<Vec<(&str, T)>, CliError> {
+        let mut rows = Vec::with_capacity(self.lines.len());
+        for line in &self.lines {
+            let json = line.strip_prefix(word).and_then(|rest| rest.strip_prefix(' '));
+            let json = json.ok_or_else(|| format!("expected a line `{word} {{...}}`, got `{line}`"))?;
+            let row = serde_json::from_str(json).map_err(|error| format!("unexpected `{line}`: {error}"))?;
+            rows.push((json, row));
+        }
+        Ok(rows)
+    }
 }
 
 impl GatewayClient {
@@ -52,15 +80,11 @@ impl GatewayClient {
 
     /// Asks for a file, and waits for all its bytes.
     pub fn file(&mut self, request: &str) -> Result<Vec<u8>, CliError> {
-        let Reply { last, .. } = self.ask(request)?;
+        let reply = self.ask(request)?;
         let word = request.split(' ').next().unwrap_or_default();
-        let length = last.strip_prefix(&format!("ok {word} bytes=")).and_then(|text| text.parse().ok());
-        let Some(length) = length.filter(|length| *length <= FILE_MAX) else {
-            return Err(match last.split_once(": ") {
-                Some((head, text)) if head.starts_with("error ") => text.into(),
-                _ => format!("expected a reply `ok {word} bytes=N`, got `{last}`").into(),
-            });
-        };
+        let form = format!("ok {word} bytes=N");
+        let length = reply.end(word, &form)?.strip_prefix("bytes=").and_then(|text| text.parse().ok());
+        let length = length.filter(|length| *length <= FILE_MAX).ok_or_else(|| reply.unexpected(&form))?;
         let mut file = Vec::new();
         let read = self.stream.by_ref().take(length).read_to_end(&mut file);
         read.map_err(|error| format!("the gateway does not send the whole file: {error}"))?;

@@ -60,25 +60,14 @@ struct Lines {
 fn ask(client: &mut GatewayClient, arguments: &LogArguments, which: &str) -> Result<Lines, CliError> {
     let axis = arguments.axis.as_ref().map(|axis| format!(" axis={axis}")).unwrap_or_default();
     let reply = client.ask(&format!("log {which} level={}{axis}", arguments.level))?;
-    let other = || format!("expected a reply `ok log N next=N missed=N`, got `{}`", reply.last);
-    let Some(end) = reply.last.strip_prefix("ok log ") else {
-        return Err(match reply.last.split_once(": ") {
-            Some((head, text)) if head.starts_with("error ") => text.into(),
-            _ => other().into(),
-        });
-    };
+    const FORM: &str = "ok log N next=N missed=N";
+    let end = reply.end("log", FORM)?;
     let number = |name: &str| {
         let word = end.split(' ').find_map(|word| word.strip_prefix(name));
-        word.and_then(|word| word.parse().ok()).ok_or_else(other)
+        word.and_then(|word| word.parse().ok()).ok_or_else(|| reply.unexpected(FORM))
     };
     let (next, missed) = (number("next=")?, number("missed=")?);
-    let event = |line: &String| -> Result<(String, LogEvent), CliError> {
-        let json = line.strip_prefix("event ");
-        let json = json.ok_or_else(|| format!("expected a line `event {{...}}`, got `{line}`"))?;
-        let event = serde_json::from_str(json).map_err(|error| format!("unexpected `{line}`: {error}"))?;
-        Ok((json.to_owned(), event))
-    };
-    let events = reply.lines.iter().map(event).collect::<Result<_, _>>()?;
+    let events = reply.rows("event")?.into_iter().map(|(text, event)| (text.to_owned(), event)).collect();
     Ok(Lines { events, next, missed })
 }
 

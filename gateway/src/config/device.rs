@@ -3,6 +3,7 @@
 use std::net::Ipv4Addr;
 
 use profile_cip::assembly::Assemblies;
+use profile_cip::device::hosts::Hosts;
 use profile_cip::wire::motion::Format;
 use profile_generic::time::DurationNs;
 
@@ -13,6 +14,10 @@ pub struct Device {
     pub name: String,
     /// Its IP address, for TCP and UDP 44818 and UDP 2222.
     pub listen: Ipv4Addr,
+    /// Who may own it and change anything in it.
+    pub controllers: Hosts,
+    /// Who else is served.
+    pub tools: Hosts,
     /// The Identity object.
     pub identity: Identity,
     /// Motion Device Axis Object, class attribute 34; 0 when each axis has its own.

@@ -129,6 +129,9 @@ pub struct ModbusTable {
     /// Address and port, such as `"0.0.0.0:502"`.
     #[schemars(transform = form::socket_address)]
     pub listen: Spanned<String>,
+    /// Hosts that are served, addresses or networks such as `"192.168.1.0/24"`. Default: every host.
+    #[schemars(transform = form::hosts, length(max = 64))]
+    pub clients: Option<Spanned<Vec<Spanned<String>>>>,
     /// Clients that can be connected at the same time, 1 to 64. Default: 8.
     #[schemars(range(min = 1, max = 64))]
     pub clients_max: Option<Spanned<i64>>,
@@ -165,6 +168,9 @@ pub struct HttpTable {
     /// Address and port, such as `"127.0.0.1:8080"`.
     #[schemars(transform = form::socket_address)]
     pub listen: Spanned<String>,
+    /// Hosts that are served, addresses or networks such as `"192.168.1.0/24"`. Default: every host.
+    #[schemars(transform = form::hosts, length(max = 64))]
+    pub clients: Option<Spanned<Vec<Spanned<String>>>>,
     /// Connections that can be open at the same time, 8 to 256; a page that is looked at holds one, and pages at most half of them.
     /// Default: 64.
     #[schemars(range(min = 8, max = 256))]
@@ -197,6 +203,12 @@ pub struct DeviceTable {
     /// Names of its axes.
     #[schemars(length(min = 1))]
     pub axes: Spanned<Vec<Spanned<String>>>,
+    /// Hosts that may own the device and change anything in it, addresses or networks such as `"192.168.1.0/24"`. Default: every host.
+    #[schemars(transform = form::hosts_v4, length(max = 64))]
+    pub controllers: Option<Spanned<Vec<Spanned<String>>>>,
+    /// Further hosts that are served; they read and listen only if there are `controllers`. Default: every host.
+    #[schemars(transform = form::hosts_v4, length(max = 64))]
+    pub tools: Option<Spanned<Vec<Spanned<String>>>>,
     /// What the device reports in its Identity object.
     pub identity: IdentityTable,
     /// Drive Power Structure Class ID (class attribute 34), which controllers may check when they connect. Default: 0, each axis has its

@@ -52,6 +52,27 @@ pub fn own_address(schema: &mut Schema) {
     pattern(schema, format!("^{any}({BYTE}\\.){{3}}{BYTE}$"));
 }
 
+/// IPv4 addresses and networks.
+pub fn hosts_v4(schema: &mut Schema) {
+    list(schema, format!("^{}$", host_v4()));
+}
+
+/// Addresses and networks.
+pub fn hosts(schema: &mut Schema) {
+    const BITS: &str = "([0-9]|[1-9][0-9]|1[01][0-9]|12[0-8])";
+    list(schema, format!("^({}|[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(/{BITS})?)$", host_v4()));
+}
+
+/// An IPv4 address or a network.
+fn host_v4() -> String {
+    format!("({BYTE}\\.){{3}}{BYTE}(/([0-9]|[12][0-9]|3[0-2]))?")
+}
+
+/// A list of texts of this form.
+fn list(schema: &mut Schema, form: String) {
+    schema.insert("items".to_owned(), json!({ "type": "string", "pattern": form }));
+}
+
 /// An address with a port.
 pub fn socket_address(schema: &mut Schema) {
     pattern(schema, format!("^(({BYTE}\\.){{3}}{BYTE}|\\[[0-9A-Fa-f:.]+(%[0-9]+)?\\]):0*{PORT}$"));

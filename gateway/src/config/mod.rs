@@ -25,6 +25,7 @@ mod startup_file;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
+use profile_cip::device::hosts::Hosts;
 use profile_generic::time::DurationNs;
 
 pub use self::axis::{Axis, AxisFunction, AxisKind, DriveAt, Limits, Nameplate, StoppingAction};
@@ -333,6 +334,8 @@ impl LogLevel {
 pub struct Modbus {
     /// Where it listens.
     pub listen: SocketAddr,
+    /// Hosts that are served.
+    pub clients: Hosts,
     /// Clients served at once.
     pub clients_max: u8,
     /// Registers that are parameters of drives.
@@ -349,10 +352,12 @@ pub struct RollingRecording {
 }
 
 /// The HTTP server.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Http {
     /// Where it listens.
     pub listen: SocketAddr,
+    /// Hosts that are served.
+    pub clients: Hosts,
     /// Connections open at once, 8 to 256.
     pub connections_max: u16,
 }

@@ -66,7 +66,7 @@ fn defaults_are_those_of_the_documentation() {
     let config = good();
     assert_eq!(config.name, "press");
     assert_eq!(
-        (&config.time, config.log_level, config.modbus.clone(), config.http),
+        (&config.time, config.log_level, config.modbus.clone(), config.http.clone()),
         (&Time::default(), LogLevel::Info, None, None)
     );
     assert_eq!((&config.mappings_dir, &config.settings_file, &config.history_dir), (&None, &None, &None));
@@ -173,9 +173,17 @@ fn values_given_are_taken() {
     assert_eq!(config.log_level, LogLevel::Debug);
     assert_eq!(
         config.modbus,
-        Some(Modbus { listen: "[::1]:502".parse().unwrap(), clients_max: 3, parameters: Vec::new() })
+        Some(Modbus {
+            listen: "[::1]:502".parse().unwrap(),
+            clients: Hosts::EVERYBODY,
+            clients_max: 3,
+            parameters: Vec::new()
+        })
     );
-    assert_eq!(config.http, Some(Http { listen: "[::1]:80".parse().unwrap(), connections_max: 256 }));
+    assert_eq!(
+        config.http,
+        Some(Http { listen: "[::1]:80".parse().unwrap(), clients: Hosts::EVERYBODY, connections_max: 256 })
+    );
     assert_eq!(config.mappings_dir.as_deref(), Some(Path::new("maps")));
     let device = &config.devices[0];
     assert_eq!(device.listen, Ipv4Addr::new(192, 0, 2, 10));

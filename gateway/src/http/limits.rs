@@ -10,8 +10,9 @@ use hyper::server::conn::http1;
 use hyper_util::rt::TokioTimer;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
-use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{Sleep, sleep};
+
+use crate::places::Place;
 
 /// How long a peer may take to send the head of its request.
 pub const HEADER_TIME_OUT: Duration = Duration::from_secs(5);
@@ -44,12 +45,12 @@ pub struct Peer {
     stall: Duration,
     /// Runs while bytes wait for the peer.
     deadline: Option<Pin<Box<Sleep>>>,
-    _place: OwnedSemaphorePermit,
+    _place: Place,
 }
 
 impl Peer {
     /// A connection that holds this place.
-    pub fn new(stream: TcpStream, stall: Duration, place: OwnedSemaphorePermit) -> Self {
+    pub fn new(stream: TcpStream, stall: Duration, place: Place) -> Self {
         Self { stream, stall, deadline: None, _place: place }
     }
 
@@ -100,21 +101,21 @@ impl AsyncWrite for Peer {
 #[cfg(test)]
 mod tests {
     use std::net::Ipv4Addr;
-    use std::sync::Arc;
 
+    use profile_cip::device::hosts::Hosts;
     use tokio::io::AsyncWriteExt as _;
     use tokio::net::TcpListener;
-    use tokio::sync::Semaphore;
     use tokio::time::Instant;
 
     use super::*;
+    use crate::places::Places;
 
     #[tokio::test]
     async fn peer_that_takes_nothing_of_an_answer_loses_its_place() {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
         let _reads_nothing = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
-        let places = Arc::new(Semaphore::new(1));
-        let place = Arc::clone(&places).try_acquire_owned().unwrap();
+        let places = Places::new(1, Hosts::EVERYBODY);
+        let place = places.take(Ipv4Addr::LOCALHOST.into()).unwrap();
         let (stream, _) = listener.accept().await.unwrap();
         let stall = Duration::from_millis(300);
         let mut peer = Peer::new(stream, stall, place);
@@ -123,16 +124,16 @@ mod tests {
         let error = peer.write_all(&vec![0; 64 << 20]).await.unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::TimedOut);
         assert!(began.elapsed() >= stall, "{:?}", began.elapsed());
-        assert_eq!(places.available_permits(), 0);
+        assert!(!places.is_empty());
         drop(peer);
-        assert_eq!(places.available_permits(), 1);
+        assert!(places.is_empty());
     }
 
     #[tokio::test]
     async fn slow_peer_that_takes_something_is_served_on() {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
         let mut reader = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
-        let place = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
+        let place = Places::new(1, Hosts::EVERYBODY).take(Ipv4Addr::LOCALHOST.into()).unwrap();
         let (stream, _) = listener.accept().await.unwrap();
         let mut peer = Peer::new(stream, Duration::from_millis(900), place);
         const LEN: usize = 32 << 20;

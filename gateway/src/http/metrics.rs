@@ -198,7 +198,7 @@ impl Scrape {
         families.states("axisbridge_state", help, None, &states, [("", status.state.as_str())])?;
         let help = "HTTP connections that were accepted";
         families.counter("axisbridge_http_connections", help, self.load.accepted)?;
-        let help = "HTTP connections that were closed because too many were open";
+        let help = "HTTP connections that were closed because too many were open or the host is not served";
         families.counter("axisbridge_http_refused_connections", help, self.load.refused)
     }
 }

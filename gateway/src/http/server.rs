@@ -10,6 +10,7 @@ use std::time::Duration;
 use axum::Router;
 use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
+use profile_cip::device::hosts::Hosts;
 use tokio::sync::{Semaphore, oneshot};
 
 use super::events::Events;
@@ -17,6 +18,7 @@ use super::limits::{HEADER_TIME_OUT, Peer, STALL_TIME_OUT, builder};
 use super::routes::{Sources, routes};
 use super::view::View;
 use crate::line_limit::{LineKind, LineLimit, Peer as LinePeer};
+use crate::places::Places;
 use crate::sys::clock::monotonic_now;
 
 /// Pause after accepting has failed, mostly because the process has no descriptors left.
@@ -30,6 +32,7 @@ const NICE: i32 = 10;
 pub struct HttpServer {
     listener: TcpListener,
     connections_max: usize,
+    clients: Hosts,
     header_time_out: Duration,
     stall_time_out: Duration,
     limit: Arc<LineLimit>,
@@ -64,7 +67,7 @@ pub struct Load {
 pub struct Counts {
     /// Connections that were accepted.
     pub accepted: u64,
-    /// Connections that were closed because too many were open.
+    /// Connections that were closed because too many were open, or the host is not served.
     pub refused: u64,
 }
 
@@ -89,10 +92,17 @@ impl HttpServer {
         Ok(Self {
             listener,
             connections_max: usize::from(connections_max),
+            clients: Hosts::EVERYBODY,
             header_time_out: HEADER_TIME_OUT,
             stall_time_out: STALL_TIME_OUT,
             limit: Arc::default(),
         })
+    }
+
+    /// Serves these hosts and nobody else.
+    #[must_use]
+    pub fn serve(self, clients: Hosts) -> Self {
+        Self { clients, ..self }
     }
 
     /// Shares the limit of lines that peers can have written with others.
@@ -151,7 +161,7 @@ impl HttpServer {
             load: Arc::clone(&load),
             downloads: Arc::new(Semaphore::new(1)),
         });
-        let places = Arc::new(Semaphore::new(self.connections_max));
+        let places = Places::new(self.connections_max, self.clients);
         tokio::spawn(async move { events.run().await });
         loop {
             let (stream, peer) = match listener.accept().await {
@@ -162,12 +172,15 @@ impl HttpServer {
                     continue;
                 }
             };
-            let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
-                load.refused.fetch_add(1, Ordering::Relaxed);
-                if self.limit.admits(monotonic_now(), LineKind::Http, LinePeer::Host(peer.ip())) {
-                    tracing::warn!(%peer, "HTTP connection refused: too many are open");
+            let place = match places.take(peer.ip()) {
+                Ok(place) => place,
+                Err(error) => {
+                    load.refused.fetch_add(1, Ordering::Relaxed);
+                    if self.limit.admits(monotonic_now(), LineKind::Http, LinePeer::Host(peer.ip())) {
+                        tracing::warn!(%peer, "HTTP connection refused: {error}");
+                    }
+                    continue;
                 }
-                continue;
             };
             load.accepted.fetch_add(1, Ordering::Relaxed);
             let peer = Peer::new(stream, self.stall_time_out, place);

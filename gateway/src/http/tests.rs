@@ -377,7 +377,7 @@ fn half_open_connections_end_and_more_than_the_limit_are_closed() {
     let refused = answer.body.lines().find_map(|line| {
         line.strip_prefix("axisbridge_http_refused_connections_total ")?.parse::<u32>().ok()
     });
-    assert!(refused.is_some_and(|refused| (1..=184).contains(&refused)), "{refused:?}");
+    assert!(refused.is_some_and(|refused| (1..=188).contains(&refused)), "{refused:?}");
 }
 
 #[test]

@@ -8,9 +8,9 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
+use profile_cip::device::hosts::Hosts;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{Instant, Sleep, sleep};
 use tokio_modbus::prelude::{ExceptionCode, Request, Response, SlaveRequest};
 use tokio_modbus::server::Service;
@@ -20,6 +20,7 @@ use super::map::{Refusal, registers};
 use super::parameters::Parameters;
 use crate::latest::Reader;
 use crate::line_limit::{LineKind, LineLimit, Peer};
+use crate::places::{Place, Places};
 use crate::status::BoxStatus;
 use crate::sys::clock::monotonic_now;
 
@@ -43,6 +44,7 @@ impl StatusSource for Reader<BoxStatus> {
 pub struct ModbusServer {
     listener: TcpListener,
     clients_max: u8,
+    hosts: Hosts,
     idle: Duration,
     parameters: Parameters,
     limit: Arc<LineLimit>,
@@ -58,6 +60,7 @@ impl ModbusServer {
         Ok(Self {
             listener,
             clients_max,
+            hosts: Hosts::EVERYBODY,
             idle: IDLE,
             parameters: Parameters::default(),
             limit: Arc::default(),
@@ -68,6 +71,12 @@ impl ModbusServer {
     #[must_use]
     pub fn with_parameters(self, parameters: Parameters) -> Self {
         Self { parameters, ..self }
+    }
+
+    /// Serves these hosts and nobody else.
+    #[must_use]
+    pub fn serve(self, hosts: Hosts) -> Self {
+        Self { hosts, ..self }
     }
 
     /// Shares the limit of lines that peers can have written with others.
@@ -89,18 +98,21 @@ impl ModbusServer {
     /// # Errors
     /// Accepting failed.
     pub async fn run(self, source: impl StatusSource) -> io::Result<()> {
-        let places = Arc::new(Semaphore::new(usize::from(self.clients_max)));
+        let places = Places::new(usize::from(self.clients_max), self.hosts);
         let source: Arc<dyn StatusSource> = Arc::new(source);
         let (idle, parameters, limit) = (self.idle, self.parameters, self.limit);
         let on_connected = |stream: TcpStream, peer: SocketAddr| {
-            let place = Arc::clone(&places).try_acquire_owned().ok();
+            let place = places.take(peer.ip());
             let (source, parameters, limit) = (Arc::clone(&source), parameters.clone(), Arc::clone(&limit));
             async move {
-                let Some(place) = place else {
-                    if limit.admits(monotonic_now(), LineKind::Modbus, Peer::Host(peer.ip())) {
-                        tracing::warn!(%peer, "Modbus client refused: too many clients are connected");
+                let place = match place {
+                    Ok(place) => place,
+                    Err(error) => {
+                        if limit.admits(monotonic_now(), LineKind::Modbus, Peer::Host(peer.ip())) {
+                            tracing::warn!(%peer, "Modbus client refused: {error}");
+                        }
+                        return Ok(None);
                     }
-                    return Ok(None);
                 };
                 tracing::debug!(%peer, "Modbus client connected");
                 Ok(Some((Registers { source, parameters }, Client::new(stream, place, idle))))
@@ -166,11 +178,11 @@ struct Client {
     stream: TcpStream,
     idle: Duration,
     deadline: Pin<Box<Sleep>>,
-    _place: OwnedSemaphorePermit,
+    _place: Place,
 }
 
 impl Client {
-    fn new(stream: TcpStream, place: OwnedSemaphorePermit, idle: Duration) -> Self {
+    fn new(stream: TcpStream, place: Place, idle: Duration) -> Self {
         Self { stream, idle, deadline: Box::pin(sleep(idle)), _place: place }
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use profile_cip::device::adapter::{Adapter, DEVICE_TIMEOUT};
 use profile_cip::device::event::Event;
+use profile_cip::device::hosts::Hosts;
 use profile_cip::device::motion_link::{AssemblyRole, MotionReply, MotionRequest, OpenParameters};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
@@ -40,6 +41,8 @@ pub(super) struct Core {
     pub on_event: Option<OnEvent>,
     pub on_open: Option<OnOpen>,
     pub on_admit: Option<OnAdmit>,
+    /// Hosts beside the controllers of the device that are served.
+    pub tools: Hosts,
     /// How many lines peers can have written.
     pub limit: Arc<LineLimit>,
     /// Whose datagrams are let through now.
@@ -71,6 +74,7 @@ impl Core {
             on_event: None,
             on_open: None,
             on_admit: None,
+            tools: Hosts::EVERYBODY,
             limit: Arc::default(),
             admitted: None,
             address,
@@ -142,7 +146,13 @@ impl Core {
         }
     }
 
-    /// The answer to a datagram.
+    /// Whether this host is served at all.
+    pub fn admits(&self, peer: SocketAddrV4) -> bool {
+        let controllers = &self.adapter.config().controllers;
+        self.tools.has_v4(*peer.ip()) || (controllers.are_listed() && controllers.has_v4(*peer.ip()))
+    }
+
+    /// The answer to a datagram; none to a host that is not served.
     pub fn datagram(
         &mut self,
         from: SocketAddrV4,
@@ -152,6 +162,9 @@ impl Core {
         self.statistics.datagrams += 1;
         if let Some(tap) = &mut self.tap {
             tap.datagram(realtime_now(), from, to, 0, bytes);
+        }
+        if !self.admits(from) {
+            return None;
         }
         let mut answer = [0; ANSWER_LEN_MAX];
         let len = self.adapter.handle_datagram(bytes, &mut answer)?;

@@ -8,8 +8,9 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use profile_cip::device::adapter::Adapter;
+use profile_cip::device::adapter::{Adapter, NoRoom};
 use profile_cip::device::event::Event;
+use profile_cip::device::hosts::Hosts;
 use profile_cip::device::motion_link::OpenParameters;
 use profile_generic::time::{DurationNs, MonotonicTime};
 use tokio::io::ReadBuf;
@@ -138,6 +139,13 @@ impl ExplicitServer {
     #[must_use]
     pub fn on_admit(mut self, on_admit: impl FnMut(Option<Admitted>) + Send + 'static) -> Self {
         self.core.on_admit = Some(Box::new(on_admit));
+        self
+    }
+
+    /// Serves these hosts and the controllers of the device, and nobody else.
+    #[must_use]
+    pub fn serve_tools(mut self, tools: Hosts) -> Self {
+        self.core.tools = tools;
         self
     }
 
@@ -327,14 +335,24 @@ impl Traffic {
 
     fn open(&mut self, tcp: TcpStream, peer: SocketAddr, now: MonotonicTime, core: &mut Core) {
         let (SocketAddr::V4(peer), Ok(SocketAddr::V4(local))) = (peer, tcp.local_addr()) else { return };
-        let crowded = self.streams.len() >= STREAMS_MAX;
-        let slot = if crowded { None } else { core.adapter.open(now, peer) };
-        let Some(slot) = slot else {
+        if !core.admits(peer) {
             if core.limit.admits(now, LineKind::Stream, host(peer)) {
-                tracing::warn!(%peer, at = %local, "stream refused: too many streams are open");
+                tracing::warn!(%peer, at = %local, "stream refused: the host is in neither `controllers` nor `tools`");
             }
             core.statistics.refused += 1;
             return;
+        }
+        let crowded = self.streams.len() >= STREAMS_MAX;
+        let slot = if crowded { Err(NoRoom::All) } else { core.adapter.open(now, peer) };
+        let slot = match slot {
+            Ok(slot) => slot,
+            Err(error) => {
+                if core.limit.admits(now, LineKind::Stream, host(peer)) {
+                    tracing::warn!(%peer, at = %local, "stream refused: {error}");
+                }
+                core.statistics.refused += 1;
+                return;
+            }
         };
         if let Err(error) = prepare(&tcp) {
             tracing::debug!(%peer, %error, "a stream cannot be set up as it should be");

@@ -312,6 +312,7 @@ pub fn start(
         let address = SocketAddrV4::new(device.listen, PORT_IO);
         let mut drops = gate.as_ref().map(|gate| DropWatch::new(Arc::clone(gate), address));
         let server = ExplicitServer::bind(device.listen, adapter, end, tap())?
+            .serve_tools(device.tools.clone())
             .limit_lines(Arc::clone(&limit))
             .attend(move |adapter| {
                 if let Some(drops) = &mut drops {
@@ -361,6 +362,7 @@ pub fn start(
             .block_on(ModbusServer::bind(modbus.listen, modbus.clients_max))
             .map_err(|source| StartError::Modbus { address: modbus.listen, source })?
             .with_parameters(parameters)
+            .serve(modbus.clients.clone())
             .limit_lines(Arc::clone(&limit));
         info!(address = %modbus.listen, "Modbus TCP");
         let source = status.clone();
@@ -381,6 +383,7 @@ pub fn start(
     });
     let http = config
         .http
+        .as_ref()
         .map(|http| {
             let files = http::Files { sheets, configuration: sources.files.shown() };
             let fixed = Fixed { sheets: Sheets::of(config, engine.mapping()), files };
@@ -439,14 +442,14 @@ pub fn start(
 
 /// Lets the HTTP server show the state.
 fn serve_http(
-    http: Http,
+    http: &Http,
     sources: &Arc<Sources>,
     fixed: Fixed,
     limit: &Arc<LineLimit>,
 ) -> Result<RunningServer, StartError> {
     let failed = |source| StartError::Http { address: http.listen, source };
     let server = HttpServer::bind(http.listen, http.connections_max).map_err(failed)?;
-    let server = server.limit_lines(Arc::clone(limit));
+    let server = server.serve(http.clients.clone()).limit_lines(Arc::clone(limit));
     let address = server.local_address().map_err(failed)?;
     let Sources { installation, status, time, histories, .. } = &**sources;
     let (names, status, time) = (installation.clone(), status.clone(), time.clone());

@@ -5,6 +5,7 @@ use core::fmt;
 use core::net::Ipv4Addr;
 use std::sync::Arc;
 
+use super::hosts::Hosts;
 use super::port::{InterfaceType, LinkState};
 use crate::assembly::Assemblies;
 use crate::wire::class1::SEQUENCE_COUNT_LEN;
@@ -61,6 +62,8 @@ pub struct AdapterConfig {
     /// Assemblies in place of the Motion Device Axis Object and its connection; intervals of their connections are those of
     /// `motion`.
     pub assembly: Option<Assemblies>,
+    /// Who may own the device and change anything in it; others may read and listen.
+    pub controllers: Hosts,
     /// Electronic data sheet of the device, served by the File object; empty for none, and then there is no such
     /// object. At most [`EDS_LEN_MAX`] bytes.
     pub eds: Arc<[u8]>,
@@ -360,6 +363,7 @@ pub(crate) mod tests {
                 power_structure_axis_ids: ArrayVec::from_iter([0x11, 0x22]),
             },
             assembly: None,
+            controllers: Hosts::EVERYBODY,
             eds: Arc::new([]),
             incarnation: 0x7A00,
         }

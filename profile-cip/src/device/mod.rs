@@ -11,7 +11,7 @@
 //! | [`visualization`] | LEDs and display |
 //!
 //! The explicit side and the motion device run on different threads; [`motion_link`] has what passes between them.
-//! [`config`], [`event`] and [`counters`] are what the application gives to the explicit side and gets from it.
+//! [`config`] with its [`hosts`], [`event`] and [`counters`] are what the application gives to the explicit side and gets from it.
 
 pub mod attribute;
 pub mod axis;
@@ -20,6 +20,7 @@ mod connection;
 pub mod counters;
 pub mod event;
 pub mod explicit;
+pub mod hosts;
 pub mod motion;
 pub mod motion_link;
 pub mod objects;

@@ -208,7 +208,7 @@ impl Device {
 
     /// A stream with a session of its own, if there is room for one more.
     fn client(&mut self, from: SocketAddrV4) -> Option<(SessionSlot, u32)> {
-        let slot = self.adapter.open(self.now, from)?;
+        let slot = self.adapter.open(self.now, from).ok()?;
         let answer = self.stream(slot, &packet(encapsulation::Command::REGISTER_SESSION, 0, &[1, 0, 0, 0]));
         let header = Header::parse(&answer).expect("an answer");
         assert_eq!(header.status, EncapsulationStatus::SUCCESS);
@@ -452,7 +452,7 @@ pub fn controller(data: &[u8]) {
         vec![Step::Enable(both), Step::MoveRelative { axis: 1, distance: 0.1, limits }, Step::Disable(both)];
     let mut controller = Controller::new(config, program).expect("a sound configuration");
     let mut said = Disturber::new(data);
-    let mut slot = device.adapter.open(device.now, CONTROLLER);
+    let mut slot = device.adapter.open(device.now, CONTROLLER).ok();
     controller.tcp_connected(device.now);
     let mut buffer = vec![0; DATAGRAM_MAX.max(4_096)];
     let began = device.now;
@@ -479,7 +479,7 @@ pub fn controller(data: &[u8]) {
                     device.adapter.close(slot);
                 }
                 if action == StreamAction::Reopen {
-                    slot = device.adapter.open(now, CONTROLLER);
+                    slot = device.adapter.open(now, CONTROLLER).ok();
                     controller.tcp_connected(now);
                 }
             }

@@ -945,7 +945,7 @@ impl Rig {
 
     /// Opens a stream beside the controller's.
     pub fn open_stream(&mut self, from: SocketAddrV4) -> Option<SessionSlot> {
-        self.adapter.open(self.now, from)
+        self.adapter.open(self.now, from).ok()
     }
 
     /// Sends bytes on such a stream and returns what comes back within `limit`, all of it.

@@ -24,9 +24,9 @@ use profile_cip::wire::class1::Class1Datagram;
 
 use super::{in_namespace, one_bus, scratch, wait_for};
 
-const CONTROLLER: &str = "192.168.10.1";
-const GATEWAY: &str = "192.168.10.20";
-const STRANGER: &str = "192.168.10.66";
+pub(super) const CONTROLLER: &str = "192.168.10.1";
+pub(super) const GATEWAY: &str = "192.168.10.20";
+pub(super) const STRANGER: &str = "192.168.10.66";
 
 /// Set for the copy of this test binary that floods: which kinds, one after the other, as [`Kind::name`] has them.
 const FLOOD: &str = "AXISBRIDGE_TEST_FLOOD";
@@ -86,10 +86,10 @@ impl Kind {
 }
 
 /// The three hosts at their switch.
-struct Network {
-    controller: Namespace,
-    gateway: Namespace,
-    stranger: Namespace,
+pub(super) struct Network {
+    pub(super) controller: Namespace,
+    pub(super) gateway: Namespace,
+    pub(super) stranger: Namespace,
     _switch: Namespace,
 }
 
@@ -102,7 +102,7 @@ fn run(namespace: &Namespace, words: &str) -> String {
 }
 
 impl Network {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let [controller, gateway, stranger, switch] = ["ctl", "box", "str", "sw"].map(Namespace::new);
         run(&switch, "ip link add br0 type bridge");
         run(&switch, "ip link set br0 up");
@@ -121,7 +121,7 @@ impl Network {
     }
 
     /// Starts a copy of this test binary in a namespace, for the role that `name` and `value` say.
-    fn copy(namespace: &Namespace, test: &str, name: &str, value: &str) -> std::process::Command {
+    pub(super) fn copy(namespace: &Namespace, test: &str, name: &str, value: &str) -> std::process::Command {
         let own = std::env::current_exe().expect("own path");
         let mut command = namespace.command(own.to_str().expect("UTF-8"));
         command.args(["--exact", test, "--nocapture"]).env(name, value);
@@ -138,16 +138,20 @@ impl Network {
 
     /// Lost updates, and datagrams that the cycle had to refuse.
     fn counted(&self) -> [u64; 2] {
-        let output = Self::copy(&self.gateway, "flood::counter_reader", COUNTERS, "127.0.0.1:1502")
-            .output()
-            .expect("it starts");
+        self.counted_at("127.0.0.1:1502")
+    }
+
+    /// The same of a gateway whose Modbus server is there.
+    pub(super) fn counted_at(&self, modbus: &str) -> [u64; 2] {
+        let output =
+            Self::copy(&self.gateway, "flood::counter_reader", COUNTERS, modbus).output().expect("it starts");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         numbers(&output.stdout, "COUNTED").try_into().expect("two numbers")
     }
 }
 
 /// The numbers in the lines that begin with a word. The harness of the copy may have begun the line.
-fn numbers(output: &[u8], word: &str) -> Vec<u64> {
+pub(super) fn numbers(output: &[u8], word: &str) -> Vec<u64> {
     let text = String::from_utf8_lossy(output);
     let of_line = |line: &str| {
         let rest = line.split_once(word)?.1;
@@ -157,7 +161,7 @@ fn numbers(output: &[u8], word: &str) -> Vec<u64> {
 }
 
 /// The shipped example with simulated drives, at the address of this test.
-fn configuration(name: &str) -> PathBuf {
+pub(super) fn configuration(name: &str) -> PathBuf {
     let mut example = include_str!("../../../examples/two-axes-in-process.toml").to_owned();
     let listen = format!("listen = \"{GATEWAY}\"");
     for (shipped, here) in [

@@ -2,8 +2,10 @@
 //!
 //! Needs root and iproute2: a visible skip where they are missing, a failure in CI.
 
+mod attackers;
 mod fixed_lists;
 mod flood;
+mod kills;
 mod masters;
 mod misbehaviour;
 mod ptp;

@@ -10,6 +10,7 @@ mod local;
 mod package;
 mod page;
 mod param;
+mod recording;
 mod reload;
 mod scripts;
 mod two_clocks;

@@ -122,6 +122,7 @@ fn package_has_each_file_in_its_place_with_owner_and_mode() {
         ("-rw-r--r--", "./usr/share/doc/axisbridge/copyright"),
         ("-rw-r--r--", "./usr/share/doc/axisbridge/changelog.gz"),
         ("-rw-r--r--", "./usr/share/doc/axisbridge/dependencies"),
+        ("-rw-r--r--", "./usr/share/doc/axisbridge/sbom.cdx.json"),
     ] {
         assert!(entries.contains(&(mode, path)), "{mode} {path} is not in\n{listed}");
     }
@@ -153,7 +154,8 @@ fn sums_are_those_of_the_package() {
     let folder = package.file.parent().expect("the folder of the package");
     let name = package.file.file_name().and_then(|name| name.to_str()).expect("a name");
     let checked = success(Command::new("sha256sum").args(["--check", "SHA256SUMS"]).current_dir(folder));
-    assert_eq!(checked.trim(), format!("{name}: OK"));
+    let bill = name.replace(".deb", ".cdx.json");
+    assert_eq!(checked.trim(), format!("{name}: OK\n{bill}: OK"));
     success(Command::new("md5sum").args(["--check", "--quiet", "DEBIAN/md5sums"]).current_dir(&package.tree));
 }
 
@@ -178,6 +180,40 @@ fn every_crate_in_the_program_is_named_with_its_licence() {
         assert!(is_version && words.len() > 2 && !line.contains("(/"), "{line}");
     }
     assert!(!list.contains("profile-"), "these are of the repository");
+}
+
+/// Judged by the library of the format's makers.
+#[test]
+fn bill_of_materials_is_valid_and_has_each_crate_of_the_program() {
+    let test = "bill_of_materials_is_valid_and_has_each_crate_of_the_program";
+    let Some(package) = package(test) else { return };
+    let path = package.tree.join("usr/share/doc/axisbridge/sbom.cdx.json");
+    let bill: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(&path).expect("the bill")).expect("JSON");
+    let list =
+        fs::read_to_string(package.tree.join("usr/share/doc/axisbridge/dependencies")).expect("the list");
+    let named: Vec<String> = list
+        .lines()
+        .map(|line| line.splitn(3, ' ').take(2).collect::<Vec<_>>().join("@").replacen("@v", "@", 1))
+        .collect();
+    let text = |one: &serde_json::Value, key: &str| one[key].as_str().expect("a text").to_owned();
+    let components = bill["components"].as_array().expect("components");
+    let own = ["mappings", "profile-cia402", "profile-cip", "profile-generic", "profile-sercos"];
+    let (ours, others): (Vec<_>, Vec<_>) =
+        components.iter().partition(|one| own.contains(&text(one, "name").as_str()));
+    let found: Vec<String> =
+        others.iter().map(|one| format!("{}@{}", text(one, "name"), text(one, "version"))).collect();
+    assert_eq!((ours.len(), found.len()), (own.len(), named.len()));
+    assert!(named.iter().all(|one| found.contains(one)), "{named:?} {found:?}");
+    for one in others {
+        assert_eq!(text(&one["hashes"][0], "content").len(), 64, "{one}");
+        assert!(!text(&one["licenses"][0], "expression").contains('/'), "{one}");
+    }
+    let Some(python) = peer::python_or_skip(test, "cyclonedx.validation.json") else { return };
+    let program = "import sys\nfrom cyclonedx.schema import SchemaVersion\n\
+                   from cyclonedx.validation.json import JsonStrictValidator\n\
+                   sys.exit(JsonStrictValidator(SchemaVersion.V1_5).validate_str(open(sys.argv[1]).read()))";
+    success(Command::new(python).arg("-c").arg(program).arg(&path));
 }
 
 #[test]

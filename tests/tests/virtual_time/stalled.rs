@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use axisbridge_tests::rig::motion::long_moves;
 use axisbridge_tests::rig::{Rig, Settings};
-use profile_cip::device::adapter::SESSIONS_MAX;
+use profile_cip::device::adapter::{SESSIONS_KEPT, SESSIONS_MAX};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 /// Everything that went over the bus, each frame with its time, and what the controller saw.
@@ -32,8 +32,8 @@ fn clients_that_stall_after_four_bytes_delay_no_cycle() {
     let alone = run(|_| {});
     assert!(alone.0.len() > 1_000, "the bus ran: {} frames", alone.0.len());
     let disturbed = run(|rig| {
-        // All streams there are but the controller's: the first four bytes of a header, and no more.
-        for client in 1..SESSIONS_MAX {
+        // All streams there are for them: the first four bytes of a header, and no more.
+        for client in 1..SESSIONS_MAX - SESSIONS_KEPT {
             let last = u8::try_from(client).expect("few clients");
             let peer = SocketAddrV4::new(Ipv4Addr::new(10, 0, 1, last), 40_000);
             let slot = rig.adapter.open(rig.now(), peer).expect("there is room");

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use profile_cip::wire::motion::Format;
 use profile_generic::time::DurationNs;
 
-use super::{Problems, assembly, value};
+use super::{Problems, assembly, hosts, value};
 use crate::config::file::{DeviceTable, IdentityTable, UpdatePeriodTable};
 use crate::config::{Device, Identity, duration};
 use crate::finding::Spanned;
@@ -27,6 +27,8 @@ pub(in crate::config) const FORMATS: [(&str, Format); 2] =
 pub(super) fn check(problems: &mut Problems, table: &DeviceTable, cycle_time: DurationNs) -> Option<Device> {
     let name = value::name(problems, "device", &table.name);
     let listen = value::own_address(problems, &table.listen);
+    let controllers = hosts::check(problems, table.controllers.as_ref(), "controllers", true);
+    let tools = hosts::check(problems, table.tools.as_ref(), "tools", true);
     let identity = identity(problems, &table.identity);
     let power_structure_class_id = value::number_or(
         problems,
@@ -42,6 +44,8 @@ pub(super) fn check(problems: &mut Problems, table: &DeviceTable, cycle_time: Du
     Some(Device {
         name: name?,
         listen: listen?,
+        controllers: controllers?,
+        tools: tools?,
         identity: identity?,
         power_structure_class_id: power_structure_class_id?,
         connection_format: connection_format?,

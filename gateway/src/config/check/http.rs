@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 
-use super::{Problems, value};
+use super::{Problems, hosts, value};
 use crate::config::Http;
 use crate::config::file::{HttpTable, ModbusTable};
 
@@ -12,6 +12,7 @@ pub(super) fn check(
     modbus: Option<&ModbusTable>,
 ) -> Option<Http> {
     let listen = value::socket_address(problems, &table.listen);
+    let clients = hosts::check(problems, table.clients.as_ref(), "clients", false);
     let connections_max =
         value::number_or(problems, &table.connections_max, "the number of HTTP connections", 8..=256, 64);
     if let (Some(own), Some(modbus)) = (listen, modbus)
@@ -21,7 +22,7 @@ pub(super) fn check(
         let what = format!("the listen address `{own}`");
         problems.duplicate(&what, modbus.listen.span(), table.listen.span());
     }
-    Some(Http { listen: listen?, connections_max: connections_max? })
+    Some(Http { listen: listen?, clients: clients?, connections_max: connections_max? })
 }
 
 #[cfg(test)]

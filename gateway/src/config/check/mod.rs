@@ -9,6 +9,7 @@ pub(super) mod can;
 pub(super) mod can_device;
 pub(super) mod device;
 pub(super) mod devicenet;
+mod hosts;
 mod http;
 mod limits;
 pub(super) mod modbus;

@@ -1,6 +1,6 @@
 //! `[modbus]`.
 
-use super::{Problems, value};
+use super::{Problems, hosts, value};
 use crate::config::file::{AxisTable, ModbusTable};
 use crate::config::{Modbus, ModbusParameter};
 use crate::finding::Spanned;
@@ -22,11 +22,12 @@ pub(super) fn check(
     axes: &[Spanned<AxisTable>],
 ) -> Option<Modbus> {
     let listen = value::socket_address(problems, &table.listen);
+    let clients = hosts::check(problems, table.clients.as_ref(), "clients", false);
     let clients_max =
         value::number_or(problems, &table.clients_max, "the number of Modbus clients", 1..=64, 8);
     problems.count(&table.parameter, "parameters", PARAMETERS_MAX);
     let parameters = parameters(problems, table, axes);
-    Some(Modbus { listen: listen?, clients_max: clients_max?, parameters: parameters? })
+    Some(Modbus { listen: listen?, clients: clients?, clients_max: clients_max?, parameters: parameters? })
 }
 
 fn parameters(

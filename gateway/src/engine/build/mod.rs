@@ -460,6 +460,7 @@ fn without_sheet(device: &Device, members: &[(usize, &Axis)], host: Host) -> Ada
                 .collect::<ArrayVec<_, 16>>(),
         },
         assembly: device.assembly.clone(),
+        controllers: device.controllers.clone(),
         eds: Arc::new([]),
         incarnation: host.incarnation,
     }

@@ -1,6 +1,6 @@
 //! A client of explicit messages.
 
-use std::net::{SocketAddr, SocketAddrV4};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 
 use profile_cip::wire::ConnectionTriad;
 use profile_cip::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
@@ -11,7 +11,7 @@ use profile_cip::wire::message_router::{Reply, Request};
 use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
 use profile_cip::wire::status::Service;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
+use tokio::net::{TcpSocket, TcpStream};
 use tokio::time::timeout;
 
 use super::LIMIT;
@@ -124,6 +124,13 @@ pub struct Client {
 impl Client {
     pub async fn connect(address: SocketAddrV4) -> Self {
         Self { stream: TcpStream::connect(address).await.unwrap(), handle: 0 }
+    }
+
+    /// From this address of the host.
+    pub async fn connect_from(host: Ipv4Addr, address: SocketAddrV4) -> Self {
+        let socket = TcpSocket::new_v4().unwrap();
+        socket.bind(SocketAddrV4::new(host, 0).into()).unwrap();
+        Self { stream: socket.connect(address.into()).await.unwrap(), handle: 0 }
     }
 
     pub async fn register(address: SocketAddrV4) -> Self {

@@ -20,6 +20,7 @@ use profile_cip::device::config::{
 };
 use profile_cip::device::ethernet_link::{InterfaceType, LinkState};
 use profile_cip::device::event::Event;
+use profile_cip::device::hosts::Hosts;
 use profile_cip::device::identity::Health;
 use profile_cip::device::motion_link::{ExplicitReply, MotionReply, MotionRequest, ObjectPath, OpenRefusal};
 use profile_cip::wire::encapsulation::Command;
@@ -78,6 +79,7 @@ pub(crate) fn test_adapter_config(address: Ipv4Addr) -> AdapterConfig {
             power_structure_axis_ids: ArrayVec::from_iter([0x11]),
         },
         assembly: None,
+        controllers: Hosts::EVERYBODY,
         eds: Arc::new([]),
         incarnation: 0x7A00,
     }

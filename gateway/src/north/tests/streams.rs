@@ -1,6 +1,8 @@
 //! Streams that stall, are too many, or end.
 
+use std::net::SocketAddr;
 use tokio::io::AsyncWriteExt;
+
 use tokio::net::TcpSocket;
 use tokio::time::Instant;
 
@@ -82,21 +84,21 @@ async fn more_requests_than_are_taken_at_once_are_all_answered_in_order() {
 }
 
 #[tokio::test]
-async fn thirty_two_streams_are_served_and_the_rest_is_closed_at_once() {
+async fn twenty_four_streams_of_a_host_are_served_and_the_rest_is_closed_at_once() {
     let (server, _device) = bind(74);
     let handle = spawn(server).unwrap();
     let mut clients = Vec::new();
     for _ in 0..40 {
         clients.push(Client::connect(handle.address()).await);
     }
-    for client in &mut clients[..32] {
+    for client in &mut clients[..24] {
         client.register_session().await;
     }
-    for client in &mut clients[32..] {
+    for client in &mut clients[24..] {
         assert!(client.is_closed().await);
     }
     // A place that becomes free is given again, however the client left.
-    clients.truncate(32);
+    clients.truncate(24);
     clients.swap_remove(0);
     let unregister = client::packet(Command::UNREGISTER_SESSION, 0, &[]);
     clients[0].stream.write_all(&unregister).await.unwrap();
@@ -114,8 +116,37 @@ async fn thirty_two_streams_are_served_and_the_rest_is_closed_at_once() {
     };
     assert_eq!(tokio::time::timeout(LIMIT, newcomer).await.unwrap(), [0x04]);
     let statistics = handle.stop().await;
-    assert!(statistics.refused >= 8 && statistics.accepted == 33, "{statistics:?}");
+    assert!(statistics.refused >= 16 && statistics.accepted == 25, "{statistics:?}");
     assert_eq!(statistics.adapter.sessions_refused, statistics.refused);
+}
+
+/// Hosts of the loopback network: a controller, a tool, and one that is neither.
+#[tokio::test]
+async fn hosts_on_no_list_are_not_served() {
+    let [controller, tool, stranger] = [1, 2, 3].map(|last| Ipv4Addr::new(127, 0, 74, last));
+    let hosts = |host: Ipv4Addr| Hosts::of([host.into()..=host.into()]);
+    let address = Ipv4Addr::new(127, 0, 0, 86);
+    let (link, _device) = motion_link();
+    let config = AdapterConfig { controllers: hosts(controller), ..test_adapter_config(address) };
+    let adapter = Adapter::new(config).unwrap();
+    let server = ExplicitServer::bind_port(SocketAddrV4::new(address, 0), adapter, link, None).unwrap();
+    let handle = spawn(server.serve_tools(hosts(tool))).unwrap();
+    for host in [controller, tool] {
+        let mut client = Client::connect_from(host, handle.address()).await;
+        client.register_session().await;
+        assert_eq!(client.get(PATH_IDENTITY, 1).await, [0x34, 0x12], "{host}");
+    }
+    assert!(Client::connect_from(stranger, handle.address()).await.is_closed().await);
+    let request = client::packet(Command::LIST_IDENTITY, 0, &[]);
+    let mut answer = [0; 256];
+    for (host, answers) in [(stranger, false), (tool, true)] {
+        let socket = UdpSocket::bind((host, 0)).await.unwrap();
+        socket.send_to(&request, SocketAddr::V4(handle.address())).await.unwrap();
+        let received = tokio::time::timeout(Duration::from_millis(500), socket.recv(&mut answer)).await;
+        assert_eq!(received.is_ok(), answers, "{host}");
+    }
+    let statistics = handle.stop().await;
+    assert_eq!((statistics.refused, statistics.accepted), (1, 2), "{statistics:?}");
 }
 
 #[tokio::test]

@@ -238,7 +238,7 @@ impl Scene {
     }
 
     fn open_stream(&mut self) {
-        self.slot = self.adapter.open(self.now, SocketAddrV4::new(CONTROLLER, STREAM_PORT));
+        self.slot = self.adapter.open(self.now, SocketAddrV4::new(CONTROLLER, STREAM_PORT)).ok();
     }
 
     /// Goes on to the next thing that is due.

@@ -22,6 +22,7 @@ use crate::device::config::{
     QosConfig,
 };
 use crate::device::explicit::adapter::{Adapter, SessionSlot};
+use crate::device::hosts::Hosts;
 use crate::device::motion::device::{DeviceConfig, MotionDevice, SyncState};
 use crate::device::motion_link::MotionReply;
 use crate::device::objects::ethernet_link::{InterfaceType, LinkState};
@@ -196,6 +197,7 @@ fn adapter(format: Format, io_port: u16) -> Adapter {
             power_structure_axis_ids: ArrayVec::new(),
         },
         assembly: None,
+        controllers: Hosts::EVERYBODY,
         eds: std::sync::Arc::new([]),
         incarnation: 0x7A00,
     })

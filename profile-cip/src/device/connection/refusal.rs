@@ -24,6 +24,11 @@ impl Refusal {
         Self { general, extended, found: None, expected: None, remaining_path_words: 0 }
     }
 
+    /// A general status alone.
+    pub fn general(general: GeneralStatus) -> Self {
+        Self { extended: ArrayVec::new(), ..Self::new(general, 0) }
+    }
+
     /// General status 0x01 and this extended one.
     pub fn connection(status: ConnectionStatus) -> Self {
         Self::new(GeneralStatus::CONNECTION_FAILURE, status.0)

@@ -16,7 +16,7 @@
 //! Nothing here waits: a session whose request is with the motion device takes no further packet until the
 //! answer, the others go on.
 
-use core::net::SocketAddrV4;
+use core::net::{Ipv4Addr, SocketAddrV4};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::list;
@@ -29,7 +29,9 @@ use crate::device::motion_link::{MotionReply, MotionRequest, OpenParameters};
 use crate::device::objects::identity::Health;
 use crate::device::objects::time_sync::TimeSyncState;
 use crate::device::port::LinkState;
-pub use crate::device::session_slot::{SESSIONS_MAX, SessionSlot};
+pub use crate::device::session_slot::{
+    NoRoom, SESSIONS_KEPT, SESSIONS_MAX, SESSIONS_OF_HOST_MAX, SessionSlot,
+};
 use crate::wire::Reader;
 use crate::wire::cpf::{EncapsulatedPacket, ItemType};
 use crate::wire::encapsulation::{Command, EncapsulationStatus, Header, PROTOCOL_VERSION, Packet};
@@ -117,16 +119,27 @@ impl Adapter {
         &self.node.qos_in_use
     }
 
-    /// Takes a new stream. `None` if there are too many: the caller closes it.
-    pub fn open(&mut self, now: MonotonicTime, peer: SocketAddrV4) -> Option<SessionSlot> {
-        let Some(index) = self.sessions.iter().position(Option::is_none) else {
-            self.node.counters.sessions_refused += 1;
-            return None;
-        };
+    /// Takes a new stream.
+    ///
+    /// # Errors
+    /// There are too many: the caller closes it.
+    pub fn open(&mut self, now: MonotonicTime, peer: SocketAddrV4) -> Result<SessionSlot, NoRoom> {
+        let index = self.free_slot(*peer.ip()).inspect_err(|_| self.node.counters.sessions_refused += 1)?;
         self.generation += 1;
         let slot = SessionSlot { index, generation: self.generation };
         self.sessions[index] = Some(Session::new(slot, peer, now));
-        Some(slot)
+        Ok(slot)
+    }
+
+    /// A free slot that a stream of this host may have.
+    fn free_slot(&self, host: Ipv4Addr) -> Result<usize, NoRoom> {
+        let open = || self.sessions.iter().flatten();
+        if open().filter(|session| *session.peer.ip() == host).count() >= SESSIONS_OF_HOST_MAX {
+            return Err(NoRoom::Host);
+        }
+        let kept = if self.node.is_controller(host) { 0 } else { SESSIONS_KEPT };
+        let free = self.sessions.iter().position(Option::is_none);
+        free.filter(|_| SESSIONS_MAX - open().count() > kept).ok_or(NoRoom::All)
     }
 
     /// The stream has ended: its session and its explicit connections are gone. The motion connection is not:

@@ -76,6 +76,7 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
             Ok(Opened::Now { o_to_t_id, t_to_o_id: open.t_to_o_id })
         }
         Application::Motion(path) => {
+            node.check_controller(*origin.peer.ip())?;
             check_motion(node)?;
             let format_revision = motion::check_path(&path, &node.config.motion)?;
             motion::check_parameters(open, &node.config.motion)?;
@@ -86,6 +87,9 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
         Application::Assembly(path) => {
             let assemblies = assemblies(node)?;
             let role = assembly::check_path(&path, assemblies)?;
+            if role == AssemblyRole::ExclusiveOwner {
+                node.check_controller(*origin.peer.ip())?;
+            }
             assembly::check_parameters(open, role, assemblies, &node.config.motion)?;
             node.connections.check_assembly(role)?;
             node.check_reset()?;

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use arrayvec::ArrayVec;
-use core::net::SocketAddrV4;
+use core::net::{Ipv4Addr, SocketAddrV4};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::adapter::{DEVICE_TIMEOUT, SessionSlot};
@@ -93,6 +93,8 @@ pub(crate) struct Node {
     requests: VecDeque<MotionRequest>,
     events: VecDeque<Event>,
     next_token: u64,
+    /// The host that owned the device last.
+    pub former_owner: Option<Ipv4Addr>,
 }
 
 impl Node {
@@ -109,6 +111,7 @@ impl Node {
             requests: VecDeque::with_capacity(REQUESTS_MAX),
             events: VecDeque::with_capacity(EVENTS_MAX),
             next_token: 1,
+            former_owner: None,
             config,
         }
     }
@@ -319,6 +322,7 @@ impl Node {
                 } else {
                     self.connections.motion = Motion::Open(owner);
                     self.connections.motion_lost = false;
+                    self.former_owner = Some(owner.open.originator);
                     self.tell(opened(&owner));
                 }
             }

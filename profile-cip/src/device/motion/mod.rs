@@ -11,7 +11,7 @@ mod instances;
 mod io_connection;
 pub mod io_counters;
 mod node;
-mod owner;
+pub(crate) mod owner;
 mod receive;
 mod service;
 mod service_channel;

@@ -23,7 +23,7 @@ pub(super) mod common {
 }
 
 /// Whether a service does nothing but read. What is not known to be harmless counts as a change.
-pub(super) fn reads(service: u8) -> bool {
+pub(crate) fn reads(service: u8) -> bool {
     let common = [common::GET_ATTRIBUTES_ALL, common::GET_ATTRIBUTE_LIST, common::GET_ATTRIBUTE_SINGLE]
         .contains(&service);
     common

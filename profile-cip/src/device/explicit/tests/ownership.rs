@@ -1,7 +1,8 @@
 //! What clients may ask while a controller owns the device.
 
 use super::rig::*;
-use crate::device::motion_link::MotionReply;
+use crate::device::hosts::Hosts;
+use crate::device::motion_link::{MotionReply, MotionRequest};
 use crate::device::objects::ethernet_link::GET_AND_CLEAR;
 use crate::device::objects::file::{CLASS_FILE, INITIATE_UPLOAD, INSTANCE_EDS, UPLOAD_TRANSFER};
 use crate::device::objects::list::OBJECT_CLASSES;
@@ -74,6 +75,40 @@ fn others_read_and_change_nothing_while_a_controller_owns_the_device() {
     rig.complete(&MotionReply::ConnectionLost { o_to_t_id: open.o_to_t_id, silent_us: 32_100 });
     for (request, outcome) in changes() {
         assert_eq!(rig.ask(other, &request).outcome(), outcome, "nobody's device: {request:02x?}");
+    }
+}
+
+#[test]
+fn hosts_that_are_no_controllers_read_and_own_nothing_at_any_time() {
+    let mut rig = Rig::new();
+    let (controller, tool) = (rig.client(1), rig.client(2));
+    let address = (*peer(1).ip()).into();
+    rig.adapter.node.config.controllers = Hosts::of([address..=address]);
+    for (request, _) in changes() {
+        assert_eq!(rig.ask(tool, &request).outcome(), REFUSED, "{request:02x?}");
+    }
+    let axis = [0x20, 0x42, 0x24, 1, 0x30, 40];
+    let forbidden = [
+        message(Service::RESET, PATH_IDENTITY, &[0]),
+        message(Service::SET_ATTRIBUTE_SINGLE, &axis, &[0]),
+        // Group_Sync, and a service that nobody knows.
+        message(Service(0x1C), &[0x20, 0x42, 0x24, 0], &[0; 20]),
+        message(Service(0x4E), &axis[..4], &[0; 4]),
+        message(Service(0x7B), &axis[..4], &[]),
+        open_message(&motion_open(1)),
+    ];
+    for request in forbidden {
+        assert_eq!(rig.ask(tool, &request).outcome(), REFUSED, "{request:02x?}");
+    }
+    assert_eq!(rig.adapter.poll_motion(), None, "nothing of it reaches the motion device");
+    assert_eq!(rig.get(tool, PATH_IDENTITY, 1).data, [0x34, 0x12]);
+    rig.open_explicit(tool, 2);
+    rig.send_unconnected(tool, &message(Service::GET_ATTRIBUTE_SINGLE, &axis, &[]));
+    assert!(matches!(rig.adapter.poll_motion(), Some(MotionRequest::Explicit(_))), "reading is free");
+
+    rig.open_motion(controller, 3);
+    for (request, outcome) in changes() {
+        assert_eq!(rig.ask(controller, &request).outcome(), outcome, "{request:02x?}");
     }
 }
 

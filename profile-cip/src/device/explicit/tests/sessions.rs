@@ -3,8 +3,10 @@
 use profile_generic::time::DurationNs;
 
 use super::rig::*;
-use crate::device::explicit::adapter::SESSIONS_MAX;
+use crate::device::explicit::adapter::{NoRoom, SESSIONS_KEPT, SESSIONS_MAX, SESSIONS_OF_HOST_MAX};
 use crate::device::explicit::session::{INPUT_MAX, OUTPUT_HIGH};
+use crate::device::hosts::Hosts;
+use crate::device::motion_link::MotionReply;
 use crate::wire::cpf::{CommonPacket, ItemType};
 use crate::wire::encapsulation::{Command, EncapsulationStatus, Packet};
 use crate::wire::list_identity::IdentityItem;
@@ -133,16 +135,57 @@ fn other_commands_by_datagram_are_refused() {
 #[test]
 fn more_streams_than_slots_are_refused_until_one_ends() {
     let mut rig = Rig::new();
-    let slots: Vec<_> = (0..SESSIONS_MAX).map(|_| rig.stream(1)).collect();
-    assert_eq!(rig.adapter.open(rig.now, peer(2)), None);
-    assert_eq!(rig.adapter.counters().sessions_refused, 1);
+    let slots: Vec<_> = (0..SESSIONS_OF_HOST_MAX).map(|_| rig.stream(1)).collect();
+    assert_eq!(rig.adapter.open(rig.now, peer(1)), Err(NoRoom::Host));
+    for _ in SESSIONS_OF_HOST_MAX..SESSIONS_MAX - SESSIONS_KEPT {
+        rig.stream(2);
+    }
+    assert_eq!(rig.adapter.open(rig.now, peer(3)), Err(NoRoom::All), "the rest is for controllers");
+    assert_eq!(rig.adapter.counters().sessions_refused, 2);
     rig.adapter.close(slots[7]);
-    let fresh = rig.stream(2);
+    let fresh = rig.stream(3);
     assert_ne!(fresh, slots[7], "a slot is not mistaken for its predecessor");
     assert!(rig.adapter.is_done(slots[7]));
     assert_eq!(rig.adapter.handle_stream(rig.now, slots[7], &[0; 24]), 0);
     rig.adapter.close(slots[7]);
-    assert_eq!(rig.adapter.sessions(), SESSIONS_MAX);
+    assert_eq!(rig.adapter.sessions(), SESSIONS_MAX - SESSIONS_KEPT);
+}
+
+#[test]
+fn streams_are_kept_for_the_owner_and_for_listed_controllers() {
+    /// Streams of two other hosts, as many as they get.
+    fn fill(rig: &mut Rig) {
+        for host in [5, 6] {
+            while rig.adapter.open(rig.now, peer(host)).is_ok() {}
+        }
+        assert_eq!(rig.adapter.open(rig.now, peer(7)), Err(NoRoom::All));
+    }
+    let mut rig = Rig::new();
+    let owner = rig.client(1);
+    let open = rig.open_motion(owner, 1);
+    rig.adapter.close(owner.slot);
+    fill(&mut rig);
+    for _ in 0..SESSIONS_KEPT {
+        rig.stream(1);
+    }
+    assert_eq!(
+        (rig.adapter.sessions(), rig.adapter.open(rig.now, peer(1))),
+        (SESSIONS_MAX, Err(NoRoom::All))
+    );
+
+    // Also after the connection has ended, and the network with it.
+    let mut rig = Rig::new();
+    let owner = rig.client(1);
+    rig.open_motion(owner, 1);
+    rig.complete(&MotionReply::ConnectionLost { o_to_t_id: open.o_to_t_id, silent_us: 32_100 });
+    rig.adapter.close(owner.slot);
+    fill(&mut rig);
+    rig.stream(1);
+
+    let mut rig = Rig::new();
+    rig.adapter.node.config.controllers = Hosts::of([(*peer(1).ip()).into()..=(*peer(1).ip()).into()]);
+    fill(&mut rig);
+    rig.stream(1);
 }
 
 #[test]
