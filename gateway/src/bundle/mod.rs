@@ -56,7 +56,7 @@ impl Files {
     }
 }
 
-/// What bundles are made of.
+/// A running gateway, as those see it that show it and make bundles of it.
 #[derive(Debug)]
 pub struct Sources {
     /// The configuration.
@@ -76,6 +76,12 @@ pub struct Sources {
 }
 
 impl Sources {
+    /// The whole gateway at this moment.
+    #[must_use]
+    pub fn overview(&self) -> Overview {
+        Overview::of(&self.installation, &self.status.read(), &self.time.read())
+    }
+
     /// The archive. It takes tens of milliseconds.
     ///
     /// # Errors
@@ -93,7 +99,7 @@ impl Sources {
             None => left_out.push_str("recording.pcapng, contacts: `[recording]` has `seconds = 0`\n"),
         }
         file("version.txt", version().as_bytes());
-        let overview = Overview::of(&self.installation, &self.status.read(), &self.time.read());
+        let overview = self.overview();
         // The objects have texts, numbers and lists, and nothing that JSON does not know.
         let pretty = |value: &serde_json::Value| serde_json::to_string_pretty(value).unwrap_or_default();
         file("status.json", pretty(&json!(overview)).as_bytes());
@@ -172,12 +178,12 @@ pub(crate) mod tests {
     use crate::time::status::tests::synchronized;
 
     /// Of a gateway that does not change.
-    pub(crate) fn sources() -> Arc<Sources> {
+    pub(crate) fn sources() -> Sources {
         let text = include_str!("../../../examples/two-axes-in-process.toml");
         let config = Config::parse(text, "two-axes-in-process.toml").unwrap();
         let (publisher, status) = latest(distinct());
         drop(publisher);
-        Arc::new(Sources {
+        Sources {
             config,
             files: Files { configuration: text.to_owned(), findings: String::new() },
             installation: installation(),
@@ -185,7 +191,7 @@ pub(crate) mod tests {
             time: TimeView::of(synchronized()),
             histories: Histories::default(),
             recording: Some(recording(None)),
-        })
+        }
     }
 
     #[test]
@@ -207,7 +213,7 @@ pub(crate) mod tests {
         }
         assert!(text.contains("listen = \"127.0.0.2\"") && text.contains("this host"));
         assert!(!text.contains("left-out.txt"));
-        let without = Sources { recording: None, ..Arc::into_inner(sources()).unwrap() };
+        let without = Sources { recording: None, ..sources() };
         let text = String::from_utf8_lossy(&without.bundle().unwrap()).into_owned();
         assert!(text.contains("left-out.txt") && !text.contains("contacts.json"));
     }

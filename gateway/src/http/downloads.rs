@@ -110,8 +110,7 @@ async fn archive(State(sources): State<Sources>, method: Method) -> Response {
 }
 
 async fn contacts(State(sources): State<Sources>) -> Response {
-    let from = sources.view.sources();
-    let recording = from.and_then(|from| from.recording.as_ref());
+    let recording = sources.view.sources().recording.as_ref();
     let contacts = recording.map(|recording| recording.contacts()).unwrap_or_default();
     typed(JSON, serde_json::to_string(&ContactList { contacts }).unwrap_or_default())
 }
@@ -124,7 +123,7 @@ async fn download(
     make: impl FnOnce(&bundle::Sources) -> Option<Result<Vec<u8>, TakeError>> + Send + 'static,
 ) -> Response {
     let nothing = || (StatusCode::NOT_FOUND, typed(TEXT, "nothing is recorded\n")).into_response();
-    let Some(from) = sources.view.sources().cloned() else { return nothing() };
+    let from = Arc::clone(sources.view.sources());
     if method == Method::HEAD {
         return typed(kind, ());
     }

@@ -11,14 +11,10 @@ use super::health::Health;
 use super::sheet::{AxisSheet, Sheets};
 use super::traces::{AxisTraces, TimeTraces, Traces};
 use crate::bundle::Sources;
-use crate::history::{FaultRecord, Histories, LogEvent, LogQuery, Selection};
-use crate::latest::Reader;
-use crate::local::installation::Installation;
+use crate::history::{FaultRecord, LogEvent, LogQuery, Selection};
 use crate::local::overview::Overview;
 use crate::local::protocol::unit;
-use crate::status::BoxStatus;
 use crate::status::pulse::Heartbeat;
-use crate::time::source::TimeView;
 
 /// Most lines of the log in an answer: what answers to all connections together take of the memory is bounded.
 pub(super) const HTTP_LINES_MAX: usize = 1_000;
@@ -29,16 +25,11 @@ pub(super) const HTTP_FAULTS_MAX: usize = 200;
 /// A view of a running gateway.
 #[derive(Debug)]
 pub struct View {
-    installation: Installation,
-    status: Reader<BoxStatus>,
-    time: TimeView,
-    histories: Histories,
+    sources: Arc<Sources>,
     fixed: Fixed,
     started: SystemTime,
     /// What the charts show. Only the server's thread takes the lock.
     traces: Mutex<Traces>,
-    /// What downloads are made of; `None` without any.
-    sources: Option<Arc<Sources>>,
     /// Of the published status. Only the server's thread takes the lock.
     heartbeat: Mutex<Heartbeat>,
 }
@@ -93,28 +84,14 @@ pub struct LogLines {
 impl View {
     /// A view of a gateway that has started at `started`.
     #[must_use]
-    pub fn new(
-        installation: Installation,
-        status: Reader<BoxStatus>,
-        time: TimeView,
-        histories: Histories,
-        fixed: Fixed,
-        started: SystemTime,
-    ) -> Self {
+    pub fn new(sources: Arc<Sources>, fixed: Fixed, started: SystemTime) -> Self {
         let heartbeat = Mutex::new(Heartbeat::new(Instant::now()));
-        let traces = Mutex::default();
-        Self { installation, status, time, histories, fixed, started, traces, sources: None, heartbeat }
+        Self { sources, fixed, started, traces: Mutex::default(), heartbeat }
     }
 
-    /// The same, with recordings, contacts and bundles for download.
-    #[must_use]
-    pub fn with_sources(self, sources: Arc<Sources>) -> Self {
-        Self { sources: Some(sources), ..self }
-    }
-
-    /// What downloads are made of.
-    pub(super) const fn sources(&self) -> Option<&Arc<Sources>> {
-        self.sources.as_ref()
+    /// What is shown, and what downloads are made of.
+    pub(super) const fn sources(&self) -> &Arc<Sources> {
+        &self.sources
     }
 
     /// When the gateway has started.
@@ -125,8 +102,8 @@ impl View {
 
     /// Takes a sample for the charts; to be called once in [`super::traces::PERIOD`].
     pub fn sample(&self) {
-        let status = self.status.read();
-        self.traces().take(&status, || self.time.read());
+        let status = self.sources.status.read();
+        self.traces().take(&status, || self.sources.time.read());
     }
 
     fn traces(&self) -> MutexGuard<'_, Traces> {
@@ -136,14 +113,14 @@ impl View {
     /// Samples of an axis, by its place, after this number.
     #[must_use]
     pub fn axis_traces(&self, place: usize, after: u64) -> Option<AxisTraces> {
-        let axis = self.installation.axes.get(place)?;
+        let axis = self.sources.installation.axes.get(place)?;
         Some(self.traces().of_axis(place, (&axis.name, unit(axis.kind)), after))
     }
 
     /// Samples of system time after this number.
     #[must_use]
     pub fn time_traces(&self, after: u64) -> TimeTraces {
-        let buses = self.installation.buses.iter().map(|bus| bus.name.as_str());
+        let buses = self.sources.installation.buses.iter().map(|bus| bus.name.as_str());
         self.traces().of_time(buses, after)
     }
 
@@ -162,19 +139,20 @@ impl View {
     /// Looks at the gateway.
     #[must_use]
     pub fn look(&self) -> Look {
-        let status = self.status.read();
+        let Sources { installation, status, time, histories, .. } = &*self.sources;
+        let status = status.read();
         let mut heartbeat = self.heartbeat.lock().unwrap_or_else(PoisonError::into_inner);
         let age = heartbeat.age(Instant::now(), status.uptime);
         drop(heartbeat);
-        let overview = Overview::of(&self.installation, &status, &self.time.read());
-        let history = Newest { log: self.histories.events.newest(), faults: self.histories.faults.changes() };
+        let overview = Overview::of(installation, &status, &time.read());
+        let history = Newest { log: histories.events.newest(), faults: histories.faults.changes() };
         Look { health: Health::of(&status, age, &overview), status: overview, history }
     }
 
     /// The faults of an axis, or of all.
     #[must_use]
     pub fn faults(&self, axis: Option<&str>) -> FaultList {
-        let mut faults = self.histories.faults.list(axis);
+        let mut faults = self.sources.histories.faults.list(axis);
         faults.truncate(HTTP_FAULTS_MAX);
         FaultList { faults }
     }
@@ -182,14 +160,14 @@ impl View {
     /// Lines of the log.
     #[must_use]
     pub fn log(&self, query: &LogQuery) -> LogLines {
-        let Selection { events, next, missed } = self.histories.events.select(query);
+        let Selection { events, next, missed } = self.sources.histories.events.select(query);
         LogLines { events: events.iter().map(|event| LogEvent::clone(event)).collect(), next, missed }
     }
 
     /// Names of the axes.
     #[must_use]
     pub fn axes(&self) -> Vec<String> {
-        self.installation.axes.iter().map(|axis| axis.name.clone()).collect()
+        self.sources.installation.axes.iter().map(|axis| axis.name.clone()).collect()
     }
 }
 
@@ -200,10 +178,15 @@ pub(super) mod tests {
     use profile_generic::fault::{Fault, FaultCause};
 
     use super::*;
+    use crate::bundle;
     use crate::engine::notice::Notice;
+    use crate::history::Histories;
     use crate::latest::{Publisher, latest};
+    use crate::local::installation::Installation;
     use crate::local::installation::tests::installation as names;
+    use crate::status::BoxStatus;
     use crate::status::tests::distinct;
+    use crate::time::source::TimeView;
     use crate::time::status::tests::synchronized;
 
     /// The names of the gateway of [`distinct`], with a name that has to be escaped.
@@ -216,7 +199,14 @@ pub(super) mod tests {
         let (publisher, reader) = latest(distinct());
         let started = SystemTime::UNIX_EPOCH + Duration::from_millis(1_700_000_000_250);
         let time = TimeView::of(synchronized());
-        (View::new(installation(), reader, time, histories(), fixed(), started), publisher)
+        let sources = Sources {
+            installation: installation(),
+            status: reader,
+            time,
+            histories: histories(),
+            ..bundle::tests::sources()
+        };
+        (View::new(Arc::new(sources), fixed(), started), publisher)
     }
 
     /// Sheets of the axes of an example, which have the same names, and the files of two devices.

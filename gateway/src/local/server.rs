@@ -21,20 +21,15 @@ use tokio::sync::mpsc;
 use tracing::{info, warn};
 
 use super::drive::job::{Ask, Context, Job, Step};
-use super::installation::Installation;
-use super::overview::Overview;
 use super::protocol::{self, BadRequest, FileRequest, LINE_MAX, NamedParameter};
 use crate::bundle::Sources;
 use crate::config::AxisKind;
 use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
-use crate::history::{Histories, LogQuery, Selection};
-use crate::latest::Reader;
+use crate::history::{LogQuery, Selection};
 use crate::line_limit::{LineKind, LineLimit, Peer};
 use crate::parameter::known::Catalogue;
-use crate::status::BoxStatus;
 use crate::sys::clock::monotonic_now;
-use crate::time::source::TimeView;
 
 /// Clients connected at the same time.
 const CLIENTS_MAX: usize = 4;
@@ -65,17 +60,9 @@ pub struct Shared {
     pub parameters: Vec<NamedParameter>,
     /// What is known of the drives.
     pub catalogue: Catalogue,
-    /// The status of the gateway.
-    pub status: Reader<BoxStatus>,
-    /// Its parts by name.
-    pub installation: Installation,
-    /// System time.
-    pub time: TimeView,
-    /// What has happened.
-    pub histories: Histories,
     /// How many lines clients can have written into the log.
     pub limit: Arc<LineLimit>,
-    /// What recordings and bundles are made of.
+    /// The gateway itself.
     pub sources: Arc<Sources>,
 }
 
@@ -87,7 +74,7 @@ impl Shared {
 
     /// The whole gateway, as the reply to `box`.
     fn overview(&self) -> String {
-        let overview = Overview::of(&self.installation, &self.status.read(), &self.time.read());
+        let overview = self.sources.overview();
         // The object has texts, numbers and lists, and nothing that JSON does not know.
         let json = serde_json::to_string(&overview).unwrap_or_default();
         format!("ok box {json}\n")
@@ -95,7 +82,7 @@ impl Shared {
 
     /// Lines of the log, each as an object.
     fn log(&self, query: &LogQuery) -> String {
-        let Selection { events, next, missed } = self.histories.events.select(query);
+        let Selection { events, next, missed } = self.sources.histories.events.select(query);
         let mut text = String::new();
         for event in &events {
             let _ = writeln!(text, "event {}", serde_json::to_string(&**event).unwrap_or_default());
@@ -107,7 +94,7 @@ impl Shared {
     /// The faults of an axis or of all, newest first, each as an object.
     fn faults(&self, axis: Option<usize>) -> String {
         let name = axis.and_then(|axis| self.names.get(axis)).map(String::as_str);
-        let records = self.histories.faults.list(name);
+        let records = self.sources.histories.faults.list(name);
         let mut text = String::new();
         for record in &records {
             let _ = writeln!(text, "fault {}", serde_json::to_string(record).unwrap_or_default());
@@ -130,7 +117,7 @@ impl Shared {
 
     /// The state of an axis in the words of the protocol.
     fn state(&self, axis: usize) -> String {
-        let status = self.status.read();
+        let status = self.sources.status.read();
         let kind = self.kinds.get(axis).copied().unwrap_or(AxisKind::Rotary);
         status.axes.get(axis).map_or_else(String::new, |axis| protocol::state(axis, kind))
     }
@@ -599,19 +586,21 @@ mod tests {
     use profile_sercos::wire::svc::Element;
     use tokio::io::{AsyncBufReadExt as _, BufReader};
 
-    use super::super::installation::NamedAxis;
+    use super::super::installation::{Installation, NamedAxis};
+    use super::super::overview::Overview;
     use super::*;
     use crate::config::TimeSource;
     use crate::engine::direct::{DirectFailure, Direction, Target};
     use crate::engine::local::Failure;
     use crate::engine::notice::Notice;
     use crate::engine::parameter::ParameterFailure;
-    use crate::history::LogEvent;
+    use crate::history::{Histories, LogEvent};
     use crate::latest::latest;
     use crate::mapping::Mapping;
     use crate::parameter::known::Bus;
     use crate::status::tests::distinct;
     use crate::time::ptp::FollowerConfig;
+    use crate::time::source::TimeView;
     use crate::time::status::TimeStatus;
 
     /// A server, and the engine's side of its queues.
@@ -652,6 +641,14 @@ mod tests {
         let kinds = vec![AxisKind::Rotary, AxisKind::Linear];
         let follower =
             FollowerConfig { identity: [1; 8], domain: 0, threshold: 10_000, asymmetry: 0, seed: 1 };
+        let installation = Installation {
+            name: "cell".to_owned(),
+            source: TimeSource::Ptp,
+            devices: Vec::new(),
+            buses: Vec::new(),
+            axes: [("x", AxisKind::Rotary), ("y", AxisKind::Linear)].map(named).to_vec(),
+        };
+        let time = TimeView::of(TimeStatus::ptp(&follower));
         Shared {
             names,
             kinds,
@@ -660,18 +657,8 @@ mod tests {
                 vec![Bus::Sercos, Bus::Devicenet { attributes: Vec::new() }],
                 &Mapping::embedded().unwrap(),
             ),
-            status,
-            installation: Installation {
-                name: "cell".to_owned(),
-                source: TimeSource::Ptp,
-                devices: Vec::new(),
-                buses: Vec::new(),
-                axes: [("x", AxisKind::Rotary), ("y", AxisKind::Linear)].map(named).to_vec(),
-            },
-            time: TimeView::of(TimeStatus::ptp(&follower)),
-            histories: Histories::default(),
             limit: Arc::default(),
-            sources: crate::bundle::tests::sources(),
+            sources: Arc::new(Sources { status, installation, time, ..crate::bundle::tests::sources() }),
         }
     }
 
@@ -692,7 +679,7 @@ mod tests {
             let path = folder.join("socket");
             let (ends, (requests, answers), direct) = queues();
             let shared = shared();
-            let histories = shared.histories.clone();
+            let histories = shared.sources.histories.clone();
             let (server, file) = LocalServer::bind(&path, shared, ends).unwrap();
             tokio::spawn(server.run());
             Self { path, histories, requests, answers, direct, _file: file, folder }
@@ -848,7 +835,7 @@ mod tests {
         }
         let fault = Fault::new(FaultCause::OVER_CURRENT, SystemTime(5));
         let fault = Notice::Fault { axis: 1, fault, loss: None, trip: None, jump: None };
-        bench.histories.faults.note(&fault, &shared().installation);
+        bench.histories.faults.note(&fault, &shared().sources.installation);
         say(&mut client, "log after=1 lines=1\nlog axis=y level=info\nfaults\nlog axis=z\nlog lines=0\n")
             .await;
         let object = |line: String, word: &str| -> serde_json::Value {

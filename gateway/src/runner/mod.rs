@@ -398,10 +398,6 @@ pub fn start(
                 kinds: config.axes.iter().map(|axis| axis.kind).collect(),
                 parameters: NamedParameter::of(engine.mapping()),
                 catalogue: Catalogue::of(config, engine.mapping()),
-                status: status.clone(),
-                installation: Installation::of(config),
-                time: time.view(),
-                histories: histories.clone(),
                 limit: Arc::clone(&limit),
                 sources: Arc::clone(&sources),
             };
@@ -451,10 +447,7 @@ fn serve_http(
     let server = HttpServer::bind(http.listen, http.connections_max).map_err(failed)?;
     let server = server.serve(http.clients.clone()).limit_lines(Arc::clone(limit));
     let address = server.local_address().map_err(failed)?;
-    let Sources { installation, status, time, histories, .. } = &**sources;
-    let (names, status, time) = (installation.clone(), status.clone(), time.clone());
-    let view = View::new(names, status, time, histories.clone(), fixed, WallClock::now())
-        .with_sources(Arc::clone(sources));
+    let view = View::new(Arc::clone(sources), fixed, WallClock::now());
     let running =
         server.start(view).map_err(|source| StartError::Thread { what: "the HTTP server", source })?;
     info!(%address, "HTTP");

@@ -22,7 +22,7 @@ use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, P
 use profile_cip::wire::status::Service;
 use profile_cip::wire::triad::ConnectionTriad;
 
-use super::flood::{CONTROLLER, GATEWAY, Network, STRANGER, numbers};
+use super::flood::{CONTROLLER, GATEWAY, Network, STRANGER, numbers, run};
 use super::{in_namespace, one_bus, scratch, wait_for};
 
 /// Set for the copy of this test binary that attacks: the name of the attack, and the milliseconds that it has.
@@ -35,8 +35,8 @@ const EXPLICIT: u16 = 44_818;
 const HTTP: u16 = 8_080;
 const MODBUS: u16 = 1_502;
 
-/// Memory that all attacks together may take: what full places and their answers hold, and the ring of the log fills anyway.
-const GROWTH_MAX_KB: u64 = 24_000;
+/// Memory that all attacks together may take: a bundle that is being made, which has the recordings twice, and what full places hold.
+const GROWTH_MAX_KB: u64 = 48_000;
 
 /// What is done to a port until the time is over; the result is how often.
 type Attack = fn(Instant) -> u64;
@@ -336,6 +336,9 @@ fn attacks_on_every_port_cost_moving_axes_nothing() {
 fn attacked(name: &str) {
     let each = time_of_each();
     let network = Network::new();
+    // The stranger answers nobody who asks for its Ethernet address.
+    let mac = run(&network.stranger, "cat /sys/class/net/net0/address");
+    run(&network.gateway, &format!("ip neigh replace {STRANGER} lladdr {mac} nud permanent dev net0"));
     let log = scratch(&format!("{name}.log"));
     let config = configuration(&format!("{name}.toml"));
     let mut command = in_namespace(&network.gateway, &["run", "--config", config.to_str().expect("UTF-8")]);

@@ -93,7 +93,7 @@ pub(super) struct Network {
     _switch: Namespace,
 }
 
-fn run(namespace: &Namespace, words: &str) -> String {
+pub(super) fn run(namespace: &Namespace, words: &str) -> String {
     let mut words = words.split(' ');
     let mut command = namespace.command(words.next().expect("a program"));
     let output = command.args(words).output().expect("it can be started");

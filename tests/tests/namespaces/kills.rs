@@ -19,7 +19,7 @@ use serde_json::Value;
 use super::attackers::{answer_of, message};
 use super::{in_namespace, one_bus, scratch, wait_for};
 
-/// How often the gateway is killed, where it is not to be four times.
+/// How often the gateway is killed, where it is not to be eight times.
 const KILLS: &str = "AXISBRIDGE_KILLS";
 
 /// Set for the copy of this test binary that reads the inactivity time-out of the device, and sets it.
@@ -149,7 +149,7 @@ fn no_kill_of_the_gateway_lets_an_axis_move_or_damages_what_is_kept() {
 }
 
 fn killed() {
-    let kills = std::env::var(KILLS).ok().and_then(|text| text.parse().ok()).unwrap_or(4);
+    let kills = std::env::var(KILLS).ok().and_then(|text| text.parse().ok()).unwrap_or(8);
     let (host, line) = (Namespace::new("box"), Namespace::new("drv"));
     cable((&host, "sercos0", None), (&line, "sercos0", None));
     let seconds = (kills * 15 + 60).to_string();
@@ -206,6 +206,11 @@ fn killed() {
         wait_for(&plant.log, "-> Running", &mut gateway);
         pause(1_500);
         moved += usize::from(plant.axes().iter().any(|(_, position)| position.abs() > STANDING));
+        // Every other time while faults are being written: the axes have lost their controller.
+        if round % 2 == 1 {
+            controller.signal("KILL");
+            pause(1_000);
+        }
         kill(&mut gateway);
         controller.terminate(Duration::from_secs(20));
     }
@@ -215,6 +220,7 @@ fn killed() {
     plant.axes_stand(kills);
     assert_eq!(plant.set(kept), kept);
     assert!(moved > 0, "no axis has moved in {kills} rounds");
+    assert!(!plant.faults().is_empty(), "no fault was written in {kills} rounds");
     for part in ["cannot be read", "damaged", "left out"] {
         assert!(!plant.log().contains(part), "{}", plant.log());
     }

@@ -135,7 +135,8 @@ fn contact_recording_fault_and_bundle_of_a_running_gateway() {
         let (frames, last) = (path("recording-contact.pcapng"), path("recording-last.pcapng"));
         written(&gateway, &["contacts", &number, "--pcapng"], &frames);
         let tree = decoded(&frames);
-        for part in ["SYN", "REGISTER_SESSION", "Forward_Open request", "Forward_Open reply: 0x00", "D-to-C"]
+        for part in
+            ["SYN", "REGISTER_SESSION", "Forward_Open request", "Forward_Open reply: success", "D-to-C"]
         {
             assert!(tree.contains(part), "no {part:?} in {tree:.20000}");
         }
@@ -150,11 +151,10 @@ fn contact_recording_fault_and_bundle_of_a_running_gateway() {
         if peer::tshark_or_skip(NAME) {
             for (file, filter) in [(&frames, "enip && tcp"), (&frames, "cipm"), (&last, "siii")] {
                 let found = tshark::dissect(file, filter, &[]);
-                assert!(
-                    !found.is_empty() && tshark::warnings(file).is_empty(),
-                    "{filter}: {:?}",
-                    tshark::warnings(file)
-                );
+                let mut warnings = tshark::warnings(file);
+                // tshark does not read telegrams that announce a phase.
+                warnings.retain(|(_, message)| !message.contains("CP is unknown"));
+                assert!(!found.is_empty() && warnings.is_empty(), "{filter}: {warnings:?}");
             }
         }
 
@@ -204,6 +204,6 @@ fn contact_recording_fault_and_bundle_of_a_running_gateway() {
         let known: Vec<_> = contacts(&gateway).iter().map(|contact| contact["number"].clone()).collect();
         assert_eq!(known, [2, 1], "{}", gateway.log());
         written(&gateway, &["contacts", &number, "--pcapng"], &frames);
-        assert!(decoded(&frames).contains("Forward_Open reply: 0x00"));
+        assert!(decoded(&frames).contains("Forward_Open reply: success"));
     });
 }
