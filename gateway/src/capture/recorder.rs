@@ -22,6 +22,7 @@ use super::synth::{DATAGRAM_LEN_MAX, SEGMENT_LEN_MAX, Synthesizer};
 use super::writer::Writer;
 use super::{FRAME_LEN_MAX, Side};
 use crate::sys::clock::KernelTime;
+use crate::sys::thread::{self, SMALL_STACK};
 
 /// Bytes after which a recording is full, unless configured.
 pub const FILE_LEN_MAX_DEFAULT: u64 = 4 << 30;
@@ -244,8 +245,7 @@ impl Recorder {
         let stop = Arc::new(AtomicBool::new(false));
         let task = Task { queues, lost, synth: Synthesizer::new(), file, sink };
         let flag = Arc::clone(&stop);
-        let thread =
-            std::thread::Builder::new().name("recorder".to_owned()).spawn(move || task.run(&flag))?;
+        let thread = thread::named("recorder", SMALL_STACK).spawn(move || task.run(&flag))?;
         Ok((Self { stop, thread }, ends))
     }
 

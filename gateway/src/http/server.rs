@@ -20,6 +20,7 @@ use super::view::View;
 use crate::line_limit::{LineKind, LineLimit, Peer as LinePeer};
 use crate::places::Places;
 use crate::sys::clock::monotonic_now;
+use crate::sys::thread::{self, STACK};
 
 /// Pause after accepting has failed, mostly because the process has no descriptors left.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -130,7 +131,8 @@ impl HttpServer {
     /// # Errors
     /// The system refuses the thread or its runtime.
     pub fn start(self, view: View) -> io::Result<RunningServer> {
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_all().thread_stack_size(STACK).build()?;
         let (stop, stopped) = oneshot::channel::<()>();
         let run = move || {
             // It never needs a privilege to be nicer; without it the server works all the same.
@@ -145,7 +147,7 @@ impl HttpServer {
             });
             // The connections end with the runtime.
         };
-        let thread = std::thread::Builder::new().name("axisbridge-http".to_owned()).spawn(run)?;
+        let thread = thread::named("axisbridge-http", STACK).spawn(run)?;
         Ok(RunningServer { stop: Some(stop), thread: Some(thread) })
     }
 

@@ -30,6 +30,7 @@ use std::thread::JoinHandle;
 
 use tokio::sync::{oneshot, watch};
 
+use crate::sys::thread::{self, SMALL_STACK};
 pub use error::ServeError;
 pub use link::{AdapterEnd, DeviceEnd, QUEUE_LEN, motion_link};
 pub use server::{ExplicitServer, STALL_LIMIT};
@@ -82,7 +83,7 @@ pub fn spawn(server: ExplicitServer) -> Result<Handle, ServeError> {
     let inside = runtime.enter();
     let running = server.start()?;
     drop(inside);
-    let thread = std::thread::Builder::new().name("axisbridge-north".to_owned()).spawn(move || {
+    let thread = thread::named("axisbridge-north", SMALL_STACK).spawn(move || {
         runtime.block_on(running.run(stopped));
         drop((runtime, end));
     });

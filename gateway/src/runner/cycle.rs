@@ -13,6 +13,7 @@ use crate::engine::axis::rest::Unrested;
 use crate::engine::port::{NorthPort, SouthPort};
 use crate::sys::clock;
 use crate::sys::realtime;
+use crate::sys::thread::{self, STACK};
 use crate::time::feed::TimeFeed;
 
 /// What the thread is asked for: to go on, to stop the axes and end, to end without waiting for them.
@@ -69,7 +70,7 @@ impl CycleThread {
         let asked = Arc::new(AtomicU8::new(RUN));
         let realtime = Arc::new(OnceLock::new());
         let (wish, told) = (Arc::clone(&asked), Arc::clone(&realtime));
-        let thread = std::thread::Builder::new().name("axisbridge-cycle".to_owned()).spawn(move || {
+        let thread = thread::named("axisbridge-cycle", STACK).spawn(move || {
             let report = realtime::apply(&setup.realtime);
             let _ = told.set(report.refused().map(ToString::to_string).collect::<Vec<_>>().join("; "));
             run(setup, &wish)

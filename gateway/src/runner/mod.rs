@@ -68,6 +68,7 @@ use crate::status::BoxStatus;
 use crate::sys::can_interface::{self, ConfigureError};
 use crate::sys::can_socket;
 use crate::sys::interface_lock::{InterfaceLock, LockError};
+use crate::sys::thread::{self, SMALL_STACK, STACK};
 use crate::sys::udp::{BindError, IoSocket, PORT_IO};
 use crate::time::object::time_sync;
 use crate::time::source::{Place, SourceError, TimeService, TimeView};
@@ -290,6 +291,7 @@ pub fn start(
         .worker_threads(2)
         .enable_all()
         .thread_name("axisbridge-aux")
+        .thread_stack_size(STACK)
         .build()
         .map_err(|source| StartError::Thread { what: "the runtime of the servers", source })?;
     let _inside = runtime.enter();
@@ -540,8 +542,7 @@ fn commission(mut commissioners: Commissioners) -> Result<(), StartError> {
             std::thread::sleep(COMMISSION_INTERVAL);
         }
     };
-    std::thread::Builder::new()
-        .name("axisbridge-commission".to_owned())
+    thread::named("axisbridge-commission", SMALL_STACK)
         .spawn(run)
         .map(drop)
         .map_err(|source| StartError::Thread { what: "the commissioning of drives that come later", source })

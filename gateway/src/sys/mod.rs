@@ -23,6 +23,7 @@ pub mod packet_socket;
 pub mod phc;
 pub mod ptp_socket;
 pub mod realtime;
+pub mod thread;
 pub mod udp;
 
 mod option;

@@ -34,6 +34,7 @@ use crate::sys::clock::{self, KernelClock, monotonic_now};
 use crate::sys::ethtool;
 use crate::sys::phc::Phc;
 use crate::sys::ptp_socket::{Dscp, OpenError, PtpSockets};
+use crate::sys::thread::{self, SMALL_STACK};
 
 /// How often the kernel is asked for the state of the host's clock.
 const LOOK: Duration = Duration::from_millis(250);
@@ -201,7 +202,7 @@ impl Drop for TimeService {
 }
 
 fn spawn(run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, SourceError> {
-    std::thread::Builder::new().name("axisbridge-time".to_owned()).spawn(run).map_err(SourceError::Thread)
+    thread::named("axisbridge-time", SMALL_STACK).spawn(run).map_err(SourceError::Thread)
 }
 
 /// EUI-64 of a MAC address (IEEE 1588-2008, clause 7.5.2.2.2).

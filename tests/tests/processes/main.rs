@@ -13,4 +13,5 @@ mod param;
 mod recording;
 mod reload;
 mod scripts;
+mod size;
 mod two_clocks;
