@@ -12,7 +12,6 @@ pub const SMALL_STACK: usize = 512 * 1_024;
 pub const STACK: usize = 1_024 * 1_024;
 
 /// A thread with this name and a stack of so many bytes, to be started.
-#[must_use]
 pub fn named(name: &str, stack: usize) -> Builder {
     Builder::new().name(name.to_owned()).stack_size(stack)
 }

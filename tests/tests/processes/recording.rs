@@ -164,8 +164,8 @@ fn contact_recording_fault_and_bundle_of_a_running_gateway() {
         provoke(&gateway);
         let kept = until(&gateway, || {
             let files = fs::read_dir(directory.join("recordings")).ok()?.flatten();
-            let path = files.map(|file| file.path()).find(|path| path.extension() == Some("pcapng".as_ref()));
-            path
+            let mut files = files.map(|file| file.path());
+            files.find(|path| path.extension() == Some("pcapng".as_ref()))
         });
         assert!(kept.to_string_lossy().ends_with("Z-turntable.pcapng"), "{kept:?}");
         assert!(decoded(&kept).contains(" on sercos port 1 "));

@@ -28,21 +28,19 @@ use crate::wire::status::{GeneralStatus, Service};
 /// Whether a service of this class changes nothing that is not its requester's own. What is not known to be harmless
 /// counts as a change.
 fn is_harmless(class: u16, service: Service) -> bool {
-    match (class, service) {
-        (_, Service::GET_ATTRIBUTES_ALL | Service::GET_ATTRIBUTE_LIST | Service::GET_ATTRIBUTE_SINGLE) => {
-            true
-        }
-        (
-            CLASS_CONNECTION_MANAGER,
-            Service::FORWARD_OPEN
-            | Service::LARGE_FORWARD_OPEN
-            | Service::FORWARD_CLOSE
-            | Service::GET_CONNECTION_DATA
-            | Service::SEARCH_CONNECTION_DATA,
-        ) => true,
-        (CLASS_FILE, INITIATE_UPLOAD | UPLOAD_TRANSFER) => true,
-        _ => false,
-    }
+    matches!(
+        (class, service),
+        (_, Service::GET_ATTRIBUTES_ALL | Service::GET_ATTRIBUTE_LIST | Service::GET_ATTRIBUTE_SINGLE)
+            | (
+                CLASS_CONNECTION_MANAGER,
+                Service::FORWARD_OPEN
+                    | Service::LARGE_FORWARD_OPEN
+                    | Service::FORWARD_CLOSE
+                    | Service::GET_CONNECTION_DATA
+                    | Service::SEARCH_CONNECTION_DATA
+            )
+            | (CLASS_FILE, INITIATE_UPLOAD | UPLOAD_TRANSFER)
+    )
 }
 
 impl Node {
