@@ -78,6 +78,11 @@ impl GatewayClient {
         Ok(Self { stream: BufReader::new(stream) })
     }
 
+    /// The connection itself.
+    pub fn into_stream(self) -> UnixStream {
+        self.stream.into_inner()
+    }
+
     /// Asks for a file, and waits for all its bytes.
     pub fn file(&mut self, request: &str) -> Result<Vec<u8>, CliError> {
         let reply = self.ask(request)?;

@@ -7,6 +7,7 @@ mod attributes;
 mod bundle;
 mod check;
 mod contacts;
+mod control;
 mod decode;
 mod demo;
 mod dictionary;
@@ -71,6 +72,8 @@ enum Command {
     /// Read, write, back up, restore and compare the parameters of a drive, and execute its commands.
     #[command(subcommand)]
     Param(param::ParamCommand),
+    /// Move axes without a controller: enable, jog, move, home, stop, reset.
+    Control(ControlArguments),
     /// Check mapping tables, overlays and a configuration, and explain the findings.
     Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
@@ -221,6 +224,26 @@ struct ContactsArguments {
     /// Write the frames of the contact to this file as well. An existing file is replaced.
     #[arg(long, value_name = "FILE", requires = "number")]
     pcapng: Option<PathBuf>,
+}
+
+/// Arguments of `control`.
+#[derive(Debug, Args)]
+struct ControlArguments {
+    /// The Unix socket of the running gateway (`run --local`).
+    #[arg(long, value_name = "SOCKET", default_value = "/run/axisbridge/local")]
+    local: PathBuf,
+    /// Jog this axis with the keys of the terminal: it moves while a key is held.
+    #[arg(long, value_name = "AXIS", requires = "velocity", conflicts_with = "requests")]
+    jog: Option<String>,
+    /// Velocity of the jog, in axis units per second.
+    #[arg(long, value_name = "V", requires = "jog")]
+    velocity: Option<String>,
+    /// Acceleration of the jog, in axis units per second squared. Default: the limit of the axis.
+    #[arg(long, value_name = "A", requires = "jog")]
+    acceleration: Option<String>,
+    /// Requests of local control, such as "move turntable 0.75 velocity=1", one after the other. Default: the lines of standard input.
+    #[arg(value_name = "REQUEST")]
+    requests: Vec<String>,
 }
 
 /// Arguments of `bundle`.
@@ -823,6 +846,7 @@ pub fn main() -> ExitCode {
         Command::Faults(arguments) => faults::run(&arguments),
         Command::Record(arguments) => record::run(&arguments),
         Command::Contacts(arguments) => contacts::run(&arguments),
+        Command::Control(arguments) => control::run(&arguments),
         Command::Bundle(arguments) => bundle::run(&arguments),
         Command::Param(command) => param::run(&command),
         Command::Check(arguments) => check::run(&arguments),

@@ -1,5 +1,6 @@
 //! The program as a user runs it: processes on real sockets, in real time.
 
+mod control;
 mod demo;
 mod doctor;
 mod ending;
