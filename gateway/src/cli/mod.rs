@@ -119,6 +119,9 @@ struct DemoArguments {
     /// Buses of the two axes, separated by commas: the first axis is on the first bus. A third bus has a third axis.
     #[arg(long, value_name = "KINDS", value_delimiter = ',', default_value = demo::DRIVES)]
     drives: Vec<demo::DriveKind>,
+    /// How the axes are moved: by CIP Motion, or by a PLC through assemblies.
+    #[arg(long, value_name = "NORTH", value_enum, default_value_t)]
+    north: demo::DemoNorth,
     /// Time of controller and gateway. "ptp" needs root and `ip`.
     #[arg(long, value_name = "SOURCE", value_enum, default_value_t)]
     time: demo::DemoTime,
@@ -649,7 +652,7 @@ enum Simulate {
     DevicenetDrive(DevicenetDriveArguments),
     /// Simulate a CIP Motion controller that configures, enables and moves the axes of a device, or runs a script.
     Controller(ControllerArguments),
-    /// Simulate a PLC that moves one axis through the assemblies of a device.
+    /// Simulate a PLC that moves axes through the assemblies of a device.
     Plc(PlcArguments),
     /// Simulate a PTP grandmaster with a clock of its own. No clock of the host is set.
     Grandmaster(GrandmasterArguments),
@@ -661,15 +664,21 @@ struct PlcArguments {
     /// The configuration of the gateway (TOML): address, layout and counts are taken from it.
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
+    /// Carry out this script (TOML) instead of one movement.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["axis", "to", "velocity", "acceleration", "interval_us", "seconds"])]
+    script: Option<PathBuf>,
+    /// Only check the script and print its steps.
+    #[arg(long, requires = "script")]
+    check: bool,
     /// The axis to move.
-    #[arg(long, value_name = "NAME")]
-    axis: String,
+    #[arg(long, value_name = "NAME", required_unless_present = "script")]
+    axis: Option<String>,
     /// Where to, in revolutions or millimetres.
-    #[arg(long, value_name = "POSITION", allow_negative_numbers = true)]
-    to: f64,
+    #[arg(long, value_name = "POSITION", allow_negative_numbers = true, required_unless_present = "script")]
+    to: Option<f64>,
     /// Velocity, in these units per second.
-    #[arg(long, value_name = "V", value_parser = positive)]
-    velocity: f64,
+    #[arg(long, value_name = "V", value_parser = positive, required_unless_present = "script")]
+    velocity: Option<f64>,
     /// Acceleration, in these units per second squared. Without it, the limit of the axis is used.
     #[arg(long, value_name = "A", value_parser = positive)]
     acceleration: Option<f64>,

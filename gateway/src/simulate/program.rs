@@ -9,7 +9,9 @@ use profile_cip::controller::{AxisSet, Limits, Step};
 use super::setup::patient;
 
 /// Share of the time for each of the two position moves; the rest is the velocity move and its stop.
-const MOVE_SHARE: f64 = 0.35;
+pub const MOVE_SHARE: f64 = 0.35;
+/// Share of the time for the velocity move and its stop.
+pub const JOG_SHARE: f64 = 1.0 - 2.0 * MOVE_SHARE;
 
 /// What an axis is asked to do, in its units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +40,8 @@ impl AxisPlan {
 
     /// Limits that make an S-curve over `distance` take about `seconds`: a tenth of the time for the jerk phases, a
     /// quarter for speeding up.
-    fn limits(distance: f64, seconds: f64) -> Limits {
+    #[must_use]
+    pub fn limits(distance: f64, seconds: f64) -> Limits {
         let velocity = 1.6 * distance.abs().max(1e-6) / seconds;
         let acceleration = velocity / (0.25 * seconds);
         Limits { velocity, acceleration, jerk: acceleration / (0.1 * seconds) }
@@ -68,7 +71,7 @@ pub fn titles(plans: &[AxisPlan]) -> Vec<String> {
 pub fn standard(plans: &[AxisPlan], seconds: f64) -> Vec<Step> {
     let axes = plans.iter().fold(AxisSet::NONE, |set, plan| set.with(plan.axis));
     let move_time = seconds * MOVE_SHARE;
-    let jog_time = seconds - 2.0 * move_time;
+    let jog_time = seconds * JOG_SHARE;
     let each = |step: &dyn Fn(&AxisPlan) -> Step| Step::Together(plans.iter().map(step).collect());
     vec![
         patient(Step::Enable(axes)),

@@ -20,6 +20,7 @@ pub mod many;
 pub mod motion;
 pub mod motion_checker;
 pub mod network;
+pub mod plc;
 pub mod ports;
 mod updates;
 pub mod wake_ups;

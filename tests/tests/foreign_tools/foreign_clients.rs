@@ -320,6 +320,43 @@ fn ethernetip_moves_an_axis_through_assemblies_beside_a_motion_device() {
 }
 
 #[test]
+fn pycomm3_reads_assemblies_without_a_connection_and_sets_none() {
+    const ADDRESS: &str = "127.0.0.72";
+    const MOTION: &str = "127.0.0.71";
+    const TEST: &str = "pycomm3_reads_assemblies_without_a_connection_and_sets_none";
+    let Some(python) = peer::python_or_skip(TEST, "pycomm3") else { return };
+    let example = with_assembly(include_str!("../../../examples/two-axes-in-process.toml"), ADDRESS);
+    let (mut running, _) = start_box_of(&example, MOTION, "foreign-assembly-object");
+    let got = ask(&python, "pycomm3_assembly.py", ADDRESS);
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+    for (what, value) in [
+        ("revision", "0200"),
+        ("output_size", "1000"),
+        ("input_size", "1400"),
+        // Nobody commands anything.
+        ("output", "00000000000000000000000000000000"),
+        ("configuration", ""),
+    ] {
+        assert_eq!(got[what], json!({ "value": value, "error": null }), "{what}");
+    }
+    for what in ["input", "connected_input"] {
+        let input = got[what]["value"].as_str().expect("20 bytes");
+        let word = u16::from_str_radix(&format!("{}{}", &input[2..4], &input[..2]), 16).expect("the status");
+        // Ready, locked, standstill, without run, torque and fault; the toggle is any.
+        assert_eq!((input.len(), word & 0x45FF & !0x1000), (40, 1 | 1 << 7 | 1 << 10), "{what}: {input}");
+    }
+    for (what, error) in [
+        ("set_output", "Attribute not settable"),
+        ("set_input", "Attribute not settable"),
+        ("members", "Attribute not supported"),
+    ] {
+        assert_eq!(got[what]["error"], error, "{what}");
+    }
+    let missing = got["missing"]["error"].as_str().expect("refused");
+    assert!(missing.starts_with("Destination unknown"), "{missing}");
+}
+
+#[test]
 fn the_python_file_for_users_moves_an_axis_or_says_why_not() {
     const ADDRESS: &str = "127.0.0.70";
     const MOTION: &str = "127.0.0.69";
@@ -388,6 +425,151 @@ fn the_simulated_plc_moves_an_axis_through_assemblies_or_says_why_not() {
     assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
     let (code, _, error) = plc("slide", "1", "1");
     assert!(code == Some(1) && error.contains("cannot connect"), "{error}");
+}
+
+/// What a script may do to the slide: moves, an idle, a silence and a close amid a movement, and what has to follow.
+const SCRIPT: &str = r#"
+interval = "20 ms"
+
+[[step]]
+enable = "slide"
+
+[[step]]
+move = { axis = "slide", to = 12.5, velocity = 50 }
+
+[[step]]
+expect = { axis = "slide", position = 12.5, tolerance = 0.05 }
+
+[[step]]
+move = { axis = "slide", to = 600, velocity = 50, wait = false }
+
+[[step]]
+expect = { axis = "slide", velocity = 50, tolerance = 5, within = "5 s" }
+
+[[step]]
+idle = "500 ms"
+
+[[step]]
+title = "START and ENABLE as levels move nothing"
+expect = { axis = "slide", status = ["fault", "locked", "run"] }
+
+[[step]]
+expect = { axis = "slide", fault = "command_lost" }
+
+[[step]]
+dwell = "300 ms"
+
+[[step]]
+expect = { axis = "slide", status_off = ["torque", "moving"] }
+
+[[step]]
+fault_reset = "slide"
+
+[[step]]
+enable = "slide"
+
+[[step]]
+move = { axis = "slide", by = 500, velocity = 50, wait = false }
+
+[[step]]
+silence = "1 s"
+
+[[step]]
+connect = true
+
+[[step]]
+expect = { axis = "slide", status = ["fault", "locked", "run"] }
+
+[[step]]
+close = true
+
+[[step]]
+dwell = "100 ms"
+
+[[step]]
+connect = true
+
+[[step]]
+fault_reset = "slide"
+
+[[step]]
+word = { axis = "slide", value = 0x0100 }
+
+[[step]]
+expect = { axis = "slide", refusal = "reserved bits" }
+
+[[step]]
+enable = "slide"
+
+[[step]]
+set = { axis = "slide", field = "velocity", value = -1 }
+
+[[step]]
+word = { axis = "slide", bits = ["enable", "start"] }
+
+[[step]]
+expect = { axis = "slide", refusal = "not positive" }
+
+[[step]]
+move = { axis = "slide", to = 0, velocity = 100 }
+
+[[step]]
+disable = "slide"
+"#;
+
+#[test]
+fn the_simulated_plc_carries_out_a_script_or_says_which_step_failed() {
+    const ADDRESS: &str = "127.0.0.74";
+    const MOTION: &str = "127.0.0.73";
+    let example = with_assembly(include_str!("../../../examples/two-axes-in-process.toml"), ADDRESS);
+    let (mut running, capture) = start_box_of(&example, MOTION, "scripted-plc");
+    let config = capture.with_extension("toml");
+    let plc = |name: &str, script: &str, more: &[&str]| {
+        let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+        std::fs::write(&path, script).expect("the scratch folder can be written");
+        let mut command = Command::new(axisbridge());
+        command.args(["simulate", "plc", "--script"]).arg(&path).arg("--config").arg(&config).args(more);
+        let output = command.output().expect("it starts");
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let (code, said, error) = plc("plc-script.toml", SCRIPT, &["--check"]);
+    assert_eq!((code, error.as_str()), (Some(0), ""));
+    assert!(said.contains("   2  line 7      move slide to 12.5 at 50 per second\n"), "{said}");
+    assert!(said.ends_with("1 axes, 28 steps; nothing was sent\n"), "{said}");
+
+    let (code, said, error) = plc("plc-script.toml", SCRIPT, &[]);
+    assert_eq!((code, error.as_str()), (Some(0), ""), "{said}");
+    assert_eq!(said.lines().filter(|line| line.starts_with("passed")).count(), 28, "{said}");
+    let last = said.lines().last().expect("a line");
+    let place: f64 = last.strip_prefix("slide at ").expect("the position").parse().expect("a number");
+    assert!(place.abs() < 0.05, "{said}");
+
+    let step = |step: &str| format!("[[step]]\nenable = \"slide\"\n[[step]]\n{step}\n");
+    for (script, expected) in [
+        (
+            step("move = { axis = \"slide\", to = -6, velocity = 50 }"),
+            "slide: the axis refuses to move: beyond limit",
+        ),
+        (
+            step("expect = { axis = \"slide\", status = [\"fault\"], within = \"200 ms\" }"),
+            "slide: expected fault on within 0.2 s, it has ",
+        ),
+        (
+            step("move = { axis = \"slide\", to = 600, velocity = 10 }\nwithin = \"1 s\""),
+            "did not move within 1 s",
+        ),
+    ] {
+        let (code, said, error) = plc("plc-failing.toml", &script, &[]);
+        assert_eq!(code, Some(1), "{said}{error}");
+        assert!(error.contains("step 2: ") && error.contains(expected), "{error}");
+        assert!(said.contains("failed     2  line 3"), "{said}");
+        assert!(said.contains("disabled and closed"), "{said}");
+    }
+    let (code, _, error) = plc("plc-wrong.toml", "[[step]]\nenable = \"turntable\"\n", &[]);
+    assert_eq!(code, Some(2), "{error}");
+    assert!(error.contains("plc-wrong.toml:2:10") && error.contains("expected one of \"slide\""), "{error}");
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
 }
 
 #[test]

@@ -165,6 +165,13 @@ impl Chain {
         self.bus.ready(self.cycle(), self.cycle(), limits)
     }
 
+    /// A rig whose device has assemblies with this layout in place of CIP Motion, and more limits of the axis.
+    pub fn ready_for_assemblies(self, layout: &str, limits: &str) -> Rig {
+        let identity = "[device.identity]";
+        let assembly = format!("assembly = {layout}\n\n{identity}");
+        self.bus.ready_with(self.cycle(), self.cycle(), limits, &[(identity, &assembly)])
+    }
+
     /// A rig whose axis turns without end: its drive counts within a revolution.
     pub fn endless(self) -> Rig {
         let axis = "motion_resolution = 1_000_000";

@@ -15,11 +15,12 @@ use profile_cia402::wire::{Function, NodeId};
 use profile_generic::can::Id;
 
 /// Runs the demo for `seconds` with its own loopback addresses and returns its JSON object and its recording.
-fn demo(seconds: u32, listen: &str, name: &str) -> (serde_json::Value, PathBuf) {
+fn demo(seconds: u32, listen: &str, name: &str, more: &[&str]) -> (serde_json::Value, PathBuf) {
     let capture = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.pcapng"));
     let output = Command::new(axisbridge())
         .args(["demo", "--json", "--seconds", &seconds.to_string(), "--listen", listen, "--capture"])
         .arg(&capture)
+        .args(more)
         .output()
         .expect("the demo can be started");
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -36,7 +37,43 @@ fn both_axes_reach_their_targets_and_tshark_agrees_on_every_frame() {
 }
 
 fn both_axes_reach_their_targets(name: &str) {
-    let (result, capture) = demo(3, "127.0.0.34", "demo-tshark");
+    let (result, capture) = demo(3, "127.0.0.34", "demo-tshark", &[]);
+    has_moved(&result);
+    if peer::tshark_or_skip(name) {
+        judge(&capture);
+    }
+}
+
+/// A PLC moves the same axes through assemblies: on the network there is a class 1 connection and no CIP Motion.
+#[test]
+fn a_plc_moves_both_axes_through_assemblies_and_tshark_reads_the_connection() {
+    let name = "a_plc_moves_both_axes_through_assemblies_and_tshark_reads_the_connection";
+    in_real_time(name, || {
+        let (result, capture) = demo(3, "127.0.0.37", "demo-assembly", &["--north", "assembly"]);
+        has_moved(&result);
+        if peer::tshark_or_skip(name) {
+            let frames = tshark::dissect(&capture, "udp.port == 2222", &[]);
+            assert!(frames.len() > 400, "{} frames", frames.len());
+            assert!(frames.iter().all(|frame| !frame.has("cipm") && !frame.has("_ws.malformed")));
+            let in_run = tshark::dissect(&capture, "cip.32bitheader.run_idle == 1", &[]);
+            assert!(in_run.len() > 200, "{} frames in run", in_run.len());
+            let opens = tshark::dissect(&capture, "cip.cm.otrpi && cip.rr == 0", &[]);
+            assert_eq!(opens.len(), 1, "one connection");
+        }
+    });
+}
+
+#[test]
+fn an_assembly_demo_has_the_time_of_the_host() {
+    let mut command = Command::new(axisbridge());
+    command.args(["demo", "--north", "assembly", "--time", "ptp"]);
+    let output = command.output().expect("the demo can be started");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && errors.contains("expected --time host"), "{errors}");
+}
+
+/// Each axis of the result was asked to move, and did.
+fn has_moved(result: &serde_json::Value) {
     let axes = result["axes"].as_array().expect("an array `axes`");
     assert_eq!(axes.len(), 2);
     for axis in axes {
@@ -49,9 +86,6 @@ fn both_axes_reach_their_targets(name: &str) {
         assert!(following > 0.0 && following < 1.0, "a drive lags, but not far: {axis}");
         assert!(number("cycles") > 200.0, "{axis}");
         assert!(axis["lost_updates"].is_u64() && axis["late_updates"].is_u64(), "{axis}");
-    }
-    if peer::tshark_or_skip(name) {
-        judge(&capture);
     }
 }
 

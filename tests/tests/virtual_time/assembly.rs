@@ -1,21 +1,14 @@
 //! A programmable controller moves axes through the assemblies of a device: through the whole chain, to the drives.
 
-use std::cell::RefCell;
-use std::net::{Ipv4Addr, SocketAddrV4};
-use std::rc::Rc;
+use std::net::Ipv4Addr;
 
 use axisbridge::engine::axis::Owner;
 use axisbridge::engine::local::{Failure, LocalNorth, Order, Request};
 use axisbridge_tests::rig::explicit::Client;
-use axisbridge_tests::rig::ports::Bytes;
-use axisbridge_tests::rig::{BOX, CONTROLLER, FIXED_BOX, Rig, Settings};
+use axisbridge_tests::rig::plc::{Plc, T_TO_O_ID};
+use axisbridge_tests::rig::{BOX, FIXED_BOX, Rig, Settings};
 use profile_cip::assembly::handshake::{Control, Status};
 use profile_cip::assembly::{Refusal, layout};
-use profile_cip::wire::ConnectionTriad;
-use profile_cip::wire::class1::Class1Datagram;
-use profile_cip::wire::forward_close::ForwardClose;
-use profile_cip::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
-use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
 use profile_generic::fault::FaultCause;
 use profile_generic::parameter::Parameter;
 use profile_generic::state::DriveState;
@@ -27,9 +20,6 @@ const NANO: i64 = 1_000_000_000;
 const TURN: i32 = 1_000_000;
 /// Interval of both directions.
 const RPI: DurationNs = DurationNs::from_millis(4);
-const PLC_PORT: u16 = 2222;
-/// Time-out: four intervals.
-const MULTIPLIER: u8 = 0;
 
 /// The gateway of the rig with assemblies in place of CIP Motion.
 fn configuration(assembly: &str) -> String {
@@ -39,239 +29,55 @@ fn configuration(assembly: &str) -> String {
     text.replacen("[device.identity]", &format!("assembly = {assembly}\n\n[device.identity]"), 1)
 }
 
-/// Connection and data of an input assembly.
-type Input = (u32, Vec<u8>);
-
-/// A programmable controller with one connection.
-struct Plc {
-    rig: Rig,
-    client: Client,
-    address: Ipv4Addr,
-    open: Option<(u32, ConnectionTriad)>,
-    sent: u32,
-    serial: u16,
-    run: bool,
-    /// The output assembly.
-    output: Vec<u8>,
-    /// The connections of the last input assemblies, and their data.
-    inputs: Rc<RefCell<Vec<Input>>>,
+fn plc(assembly: &str) -> Plc {
+    with(configuration(assembly))
 }
 
-const T_TO_O_ID: u32 = 0x5500_0000;
+fn with(configuration: String) -> Plc {
+    Plc::new(Settings { configuration, ..Settings::default() }, RPI)
+}
 
-impl Plc {
-    fn new(assembly: &str) -> Self {
-        let len = if assembly.contains("motion") { 48 } else { 32 };
-        Self::on(Settings { configuration: configuration(assembly), ..Settings::default() }, len)
-    }
+/// Enabled, and amid a long movement at one revolution a second.
+fn in_motion() -> Plc {
+    moving(plc("{}"))
+}
 
-    /// A gateway with these settings, whose output assembly has so many bytes.
-    fn on(settings: Settings, len: usize) -> Self {
-        let mut rig = Rig::ready(settings);
-        let inputs = Rc::<RefCell<Vec<_>>>::default();
-        let seen = Rc::clone(&inputs);
-        rig.tamper_actual = Some(Box::new(move |datagram: &mut Bytes| {
-            let datagram = Class1Datagram::parse(datagram.as_slice()).expect("a class 1 datagram");
-            seen.borrow_mut().push((datagram.connection_id, datagram.data.to_vec()));
-            false
-        }));
-        let client = Client::connect(&mut rig, CONTROLLER);
-        assert_eq!(rig.engine.assemblies().len(), 1);
-        Self {
-            rig,
-            client,
-            address: CONTROLLER,
-            open: None,
-            sent: 0,
-            serial: 0,
-            run: true,
-            output: vec![0; len],
-            inputs,
-        }
-    }
+fn moving(mut plc: Plc) -> Plc {
+    plc.connect();
+    plc.enable();
+    plc.target(20 * TURN, TURN, 10 * TURN);
+    plc.word(Control::ENABLE | Control::START);
+    plc.run_for(600);
+    assert!((plc.speed() - NANO).abs() < NANO / 50, "{}", plc.speed());
+    plc
+}
 
-    /// Sends a Forward_Open; its status, extended status and data.
-    fn ask_open(&mut self, consumed: u16, sizes: (u16, u16)) -> (u8, u16, Vec<u8>) {
-        self.serial += 1;
-        let triad = ConnectionTriad {
-            connection_serial: self.serial,
-            originator_vendor: 7,
-            originator_serial: 0x1234_5678,
-        };
-        let direction = |size| NetworkParameters {
-            redundant_owner: false,
-            connection_type: ConnectionType::POINT_TO_POINT,
-            priority: Priority::SCHEDULED,
-            variable: false,
-            size,
-        };
-        let point = |point: u16| [0x2C, point.to_le_bytes()[0]];
-        let produced = if consumed == 21 { 71 } else { layout::INPUT_POINT };
-        let path = [[0x20, 4], [0x24, 151], point(consumed), point(produced)].concat();
-        let us = u32::try_from(RPI.as_nanos() / 1_000).unwrap();
-        let open = ForwardOpen {
-            large: false,
-            priority_tick: 5,
-            timeout_ticks: 157,
-            o_to_t_id: 0,
-            t_to_o_id: T_TO_O_ID + u32::from(self.serial),
-            triad,
-            timeout_multiplier: MULTIPLIER,
-            o_to_t_rpi_us: us,
-            o_to_t: direction(sizes.0),
-            t_to_o_rpi_us: us,
-            t_to_o: direction(sizes.1),
-            transport: Transport { server: false, trigger: Trigger::CYCLIC, class: 1 },
-            path: &path,
-        };
-        let mut data = vec![0; open.buffer_len()];
-        open.emit(&mut data).unwrap();
-        let answer = self.client.request_extended(&mut self.rig, 0x54, &[0x20, 6, 0x24, 1], &data);
-        if answer.0 == 0 {
-            let reply = ForwardOpenReply::parse(&answer.2).unwrap();
-            self.open = Some((reply.o_to_t_id, triad));
-            self.sent = 0;
-        }
-        answer
-    }
+/// What the tests do with the turntable.
+trait Turntable {
+    /// Target, velocity and acceleration, in counts.
+    fn target(&mut self, target: i32, velocity: i32, acceleration: i32);
+    /// The actual position that the controller is shown, in counts.
+    fn shown(&self) -> i32;
+    /// Nothing moves and nothing has torque, whatever the word says, for a second.
+    fn stays_off(&mut self);
+    /// Velocity in counts, and 10 revolutions per second squared.
+    fn velocity(&mut self, velocity: i32);
+    /// Sends [`curve`] for so many milliseconds; the stamps are that far ahead, if there are some. Returns the largest distance
+    /// of the drive from the curve at the instant of the stamp, in nanounits, and the fastest it was.
+    fn follow(&mut self, millis: i64, ahead: Option<DurationNs>) -> (i64, i64);
+}
 
-    fn connect(&mut self) {
-        let (point, size) = match self.output.len() {
-            4 => (21, 6),
-            48 => (layout::OUTPUT_POINT, 66),
-            64 => (layout::OUTPUT_POINT, 82),
-            _ => (layout::OUTPUT_POINT, 42),
-        };
-        let answer = self.ask_open(point, (self.o_to_t_size(), size));
-        assert_eq!((answer.0, answer.1), (0, 0));
-    }
-
-    fn o_to_t_size(&self) -> u16 {
-        u16::try_from(self.output.len() + 6).unwrap()
-    }
-
-    fn close(&mut self) {
-        let (_, triad) = self.open.take().expect("a connection");
-        let close = ForwardClose { priority_tick: 5, timeout_ticks: 157, triad, path: &[] };
-        let mut data = vec![0; close.buffer_len()];
-        close.emit(&mut data).unwrap();
-        let answer = self.client.request(&mut self.rig, 0x4E, &[0x20, 6, 0x24, 1], &data);
-        assert_eq!(answer.0, 0);
-    }
-
-    fn send(&mut self, data: &[u8]) {
-        let Some((connection_id, _)) = self.open else { return };
-        self.sent += 1;
-        let [low, high, ..] = self.sent.to_le_bytes();
-        let datagram = Class1Datagram {
-            connection_id,
-            encapsulation_sequence: self.sent,
-            sequence_count: u16::from_le_bytes([low, high]),
-            data,
-        };
-        let mut bytes = vec![0; datagram.buffer_len()];
-        datagram.emit(&mut bytes).unwrap();
-        self.rig.inject_datagram(&bytes, SocketAddrV4::new(self.address, PLC_PORT));
-    }
-
-    /// One interval.
-    fn scan(&mut self) {
-        let header = u32::from(self.run).to_le_bytes();
-        let data = [&header[..], &self.output].concat();
-        self.send(&data);
-        self.rig.run_for(RPI);
-    }
-
-    fn run_for(&mut self, millis: i64) {
-        for _ in 0..millis / 4 {
-            self.scan();
-        }
-    }
-
-    fn until(&mut self, limit_ms: i64, what: &str, done: impl Fn(&Self) -> bool) {
-        for _ in 0..limit_ms / 4 {
-            if done(self) {
-                return;
-            }
-            self.scan();
-        }
-        let told = self.rig.told();
-        panic!("{what} is not reached in {limit_ms} ms: {:?} {:?}\n{told}", self.status(), self.refusal());
-    }
-
-    fn word(&mut self, word: Control) {
-        self.output[..2].copy_from_slice(&word.bits().to_le_bytes());
-    }
-
-    /// Target, velocity and acceleration of the turntable, in counts.
+impl Turntable for Plc {
     fn target(&mut self, target: i32, velocity: i32, acceleration: i32) {
-        self.output[4..8].copy_from_slice(&target.to_le_bytes());
-        self.output[8..12].copy_from_slice(&velocity.to_le_bytes());
-        self.output[12..16].copy_from_slice(&acceleration.to_le_bytes());
-    }
-
-    fn input(&self) -> Vec<u8> {
-        self.inputs.borrow().last().expect("an input assembly").1.clone()
-    }
-
-    fn status(&self) -> Status {
-        let input = self.input();
-        Status::from_bits_retain(u16::from_le_bytes([input[0], input[1]]))
-    }
-
-    fn is(&self, status: Status) -> bool {
-        self.status().contains(status)
-    }
-
-    fn refusal(&self) -> Refusal {
-        Refusal(self.input()[3])
-    }
-
-    fn fault(&self) -> FaultCause {
-        let input = self.input();
-        FaultCause(u16::from_le_bytes([input[4], input[5]]))
+        self.set(0, "target_position_32", i64::from(target));
+        self.set(0, "velocity", i64::from(velocity));
+        self.set(0, "acceleration", i64::from(acceleration));
     }
 
     fn shown(&self) -> i32 {
-        i32::from_le_bytes(self.input()[8..12].try_into().unwrap())
+        i32::try_from(self.get(0, "actual_position_32")).expect("32 bits")
     }
 
-    fn place(&self) -> i64 {
-        self.rig.drive(0).servo().position().get()
-    }
-
-    fn speed(&self) -> i64 {
-        self.rig.drive(0).actual().velocity.get()
-    }
-
-    fn state(&self) -> DriveState {
-        self.rig.engine.axes()[0].state()
-    }
-
-    fn enable(&mut self) {
-        self.word(Control::empty());
-        self.run_for(40);
-        self.word(Control::ENABLE);
-        self.until(2_000, "operation", |plc| plc.is(Status::ENABLED));
-    }
-
-    /// Enabled, and amid a long movement at one revolution a second.
-    fn in_motion() -> Self {
-        Self::new("{}").moving()
-    }
-
-    fn moving(self) -> Self {
-        let mut plc = self;
-        plc.connect();
-        plc.enable();
-        plc.target(20 * TURN, TURN, 10 * TURN);
-        plc.word(Control::ENABLE | Control::START);
-        plc.run_for(600);
-        assert!((plc.speed() - NANO).abs() < NANO / 50, "{}", plc.speed());
-        plc
-    }
-
-    /// Nothing moves and nothing has torque, whatever the word says, for a second.
     fn stays_off(&mut self) {
         let place = self.place();
         for _ in 0..250 {
@@ -280,6 +86,29 @@ impl Plc {
         }
         assert!((self.place() - place).abs() < NANO / 10_000, "{} {place}", self.place());
     }
+
+    fn velocity(&mut self, velocity: i32) {
+        self.set(0, "velocity", i64::from(velocity));
+        self.set(0, "acceleration", i64::from(10 * TURN));
+    }
+
+    fn follow(&mut self, millis: i64, ahead: Option<DurationNs>) -> (i64, i64) {
+        let start = self.rig.now();
+        let (mut away, mut fastest) = (0, 0);
+        for _ in 0..millis / 4 {
+            let seconds = |span: DurationNs| profile_generic::cast::f64_from_i64(span.as_nanos()) / 1e9;
+            let passed = self.rig.now().since(start);
+            let set_point = counts(curve(seconds(passed + ahead.unwrap_or(DurationNs::ZERO))));
+            self.set(0, "target_position_64", set_point);
+            let stamp = ahead.map_or(0, |ahead| self.rig.system().0 + ahead.magnitude());
+            self.set(0, "time_stamp", stamp.cast_signed());
+            self.scan();
+            let here = counts(curve(seconds(self.rig.now().since(start)))) * 1_000;
+            away = away.max((self.place() - here).abs());
+            fastest = fastest.max(self.speed().abs());
+        }
+        (away, fastest)
+    }
 }
 
 /// What the nameplate of an axis says is compared with its drive here too.
@@ -287,7 +116,7 @@ impl Plc {
 fn another_motor_than_the_configured_one_is_reported() {
     let nameplate = "instance = 1\nmotor = { type = \"rotary-permanent-magnet\", rated_current = 9.9 }\n";
     let configuration = configuration("{}").replacen("instance = 1\n", nameplate, 1);
-    let mut plc = Plc::on(Settings { configuration, ..Settings::default() }, 32);
+    let mut plc = with(configuration);
     plc.run_for(200);
     let said = plc.rig.told();
     assert_eq!(
@@ -303,7 +132,7 @@ fn parameters_of_the_drive_are_attributes_of_a_vendor_object() {
     const GET: u8 = 0x0E;
     const SET: u8 = 0x10;
     const GAIN: u16 = Parameter::POSITION_LOOP_GAIN.0;
-    let mut plc = Plc::new("{}");
+    let mut plc = plc("{}");
     let path = |instance: u8, attribute: u16| {
         let [low, high] = attribute.to_le_bytes();
         [0x20, 0x64, 0x24, instance, 0x31, 0, low, high]
@@ -349,11 +178,54 @@ fn parameters_of_the_drive_are_attributes_of_a_vendor_object() {
     assert_eq!(held(&plc, 0), before);
 }
 
+/// The Assembly object has what is sent and what counts, for those that have no connection, and moves nothing.
+#[test]
+fn assemblies_are_read_by_explicit_messages_and_set_by_the_owner_alone() {
+    const GET: u8 = 0x0E;
+    const SET: u8 = 0x10;
+    let mut plc = plc("{}");
+    let panel = Client::connect(&mut plc.rig, Ipv4Addr::new(10, 0, 0, 99));
+    let ask = |plc: &mut Plc, service, instance: u16, data: &[u8]| {
+        let path = [0x20, 4, 0x24, instance.to_le_bytes()[0], 0x30, 3];
+        // An exchange takes some of the time in which the connection has to be fed.
+        plc.scan();
+        panel.request(&mut plc.rig, service, &path, data)
+    };
+    let (output, input) = (layout::OUTPUT_POINT, layout::INPUT_POINT);
+    plc.output[..2].copy_from_slice(&[1, 0]);
+    plc.target(20 * TURN, TURN, 10 * TURN);
+    assert_eq!(ask(&mut plc, GET, output, &[]), (0, vec![0; 32]), "nobody is connected");
+    let all = plc.output.clone();
+    assert_eq!(ask(&mut plc, SET, output, &all).0, 0x0E, "nothing moves an axis but a connection");
+    plc.rig.run_for(DurationNs::from_millis(100));
+    assert!(plc.rig.torque_free());
+
+    let mut plc = moving(plc);
+    let (status, shown) = ask(&mut plc, GET, output, &[]);
+    assert_eq!((status, &shown), (0, &plc.output), "what counts now");
+    let (status, shown) = ask(&mut plc, GET, input, &[]);
+    assert_eq!((status, shown.len()), (0, 40));
+    let word = Status::from_bits_retain(u16::from_le_bytes([shown[0], shown[1]]));
+    assert!(word.contains(Status::RUN | Status::ENABLED | Status::MOVING), "{word:?}");
+    let place = i32::from_le_bytes(shown[8..12].try_into().expect("four bytes"));
+    assert!((i64::from(place) * 1_000 - plc.place()).abs() < NANO / 50, "{place} {}", plc.place());
+    assert_eq!(ask(&mut plc, SET, output, &[0; 32]).0, 0x0F, "another owns it");
+    assert_eq!(ask(&mut plc, SET, input, &[0; 40]).0, 0x0F);
+    let owner = plc.client;
+    plc.scan();
+    let set = owner.request(&mut plc.rig, SET, &[0x20, 4, 0x24, 150, 0x30, 3], &[0; 32]);
+    assert_eq!(set.0, 0x0E, "not even the owner, beside its connection");
+    // Idle data do not count.
+    plc.run = false;
+    plc.run_for(20);
+    assert_eq!(ask(&mut plc, GET, output, &[]), (0, vec![0; 32]));
+}
+
 const ALL: Control = Control::ENABLE.union(Control::START).union(Control::RESET);
 
 #[test]
 fn a_plc_enables_an_axis_moves_it_and_takes_its_torque_away() {
-    let mut plc = Plc::new("{}");
+    let mut plc = plc("{}");
     assert_eq!(plc.rig.status().axes[0].owner, Owner::Nobody);
     plc.connect();
     plc.word(Control::ENABLE);
@@ -398,7 +270,7 @@ fn a_plc_enables_an_axis_moves_it_and_takes_its_torque_away() {
 
 #[test]
 fn stop_brakes_with_torque_and_wins_over_start() {
-    let mut plc = Plc::in_motion();
+    let mut plc = in_motion();
     plc.word(Control::ENABLE | Control::STOP);
     plc.until(1_000, "standstill", |plc| plc.is(Status::STANDSTILL) && !plc.is(Status::MOVING));
     let place = plc.place();
@@ -419,7 +291,7 @@ fn stop_brakes_with_torque_and_wins_over_start() {
 
 #[test]
 fn idle_stops_as_configured_and_nothing_moves_when_it_runs_again() {
-    let mut plc = Plc::in_motion();
+    let mut plc = in_motion();
     plc.run = false;
     plc.until(1_000, "the stop", |plc| plc.rig.torque_free());
     plc.run_for(100);
@@ -442,7 +314,7 @@ fn idle_stops_as_configured_and_nothing_moves_when_it_runs_again() {
 
 #[test]
 fn a_lost_connection_stops_as_configured_and_nothing_moves_on_the_next_one() {
-    let mut plc = Plc::in_motion();
+    let mut plc = in_motion();
     let before = plc.rig.now();
     let gone = plc.open.take();
     plc.rig.run_until(DurationNs::from_secs(1), "the stop", |rig| rig.engine.axes()[0].fault().is_some());
@@ -477,7 +349,7 @@ fn a_lost_connection_stops_as_configured_and_nothing_moves_on_the_next_one() {
 fn an_axis_that_holds_after_a_loss_loses_its_torque_with_the_reset() {
     let hold = "motion_resolution = 1_000_000\non_command_loss = \"ramped-decel-and-hold\"";
     let text = configuration("{}").replacen("motion_resolution = 1_000_000", hold, 1);
-    let mut plc = Plc::on(Settings { configuration: text, ..Settings::default() }, 32).moving();
+    let mut plc = moving(with(text));
     plc.open = None;
     plc.rig.run_for(DurationNs::from_millis(600));
     assert!(plc.rig.watched[0].on, "it holds with torque");
@@ -499,7 +371,7 @@ fn an_axis_that_holds_after_a_loss_loses_its_torque_with_the_reset() {
 
 #[test]
 fn local_control_moves_the_axis_only_while_no_controller_owns_it() {
-    let mut plc = Plc::new("{}");
+    let mut plc = plc("{}");
     let (local, mut end) = LocalNorth::new(plc.rig.engine.axes().len());
     plc.rig.engine.set_local(local);
     let mut order = |plc: &mut Plc, id, order| {
@@ -525,7 +397,7 @@ fn local_control_moves_the_axis_only_while_no_controller_owns_it() {
 
 #[test]
 fn a_closed_connection_stops_as_a_lost_one() {
-    let mut plc = Plc::in_motion();
+    let mut plc = in_motion();
     plc.close();
     plc.rig.run_until(DurationNs::from_secs(1), "the end of the torque", Rig::torque_free);
     assert_eq!(plc.rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::COMMAND_LOST));
@@ -536,7 +408,7 @@ fn a_closed_connection_stops_as_a_lost_one() {
 
 #[test]
 fn a_fault_of_the_drive_is_shown_and_reset_by_an_edge() {
-    let mut plc = Plc::in_motion();
+    let mut plc = in_motion();
     plc.rig.drive_mut(0).raise_fault(FaultCause::OVER_CURRENT);
     plc.until(500, "the fault", |plc| plc.is(Status::FAULT));
     plc.until(500, "its cause", |plc| plc.fault() == FaultCause::OVER_CURRENT);
@@ -553,7 +425,7 @@ fn a_fault_of_the_drive_is_shown_and_reset_by_an_edge() {
 
 #[test]
 fn orders_that_cannot_be_carried_out_are_refused_with_their_reason() {
-    let mut plc = Plc::new("{}");
+    let mut plc = plc("{}");
     plc.connect();
     plc.word(Control::empty());
     plc.run_for(20);
@@ -595,28 +467,18 @@ fn orders_that_cannot_be_carried_out_are_refused_with_their_reason() {
     assert_eq!(Refusal(plc.input()[23]), Refusal::BEYOND_LIMIT);
 }
 
-impl Plc {
-    /// Enabled in mode 2, with a drive of these modes and an axis with these limits of its travel, in revolutions.
-    fn at_a_velocity(modes: &str, (min, max): (i32, i32)) -> Self {
-        const MODE: usize = 2;
-        const VELOCITY: u8 = 2;
-        let modes = format!("address = 1\nmodes = [\"{modes}\"]");
-        let ends = format!("acceleration = 100.0\nposition_min = {min}.0\nposition_max = {max}.0");
-        let text = configuration("{ layout = \"mixed\" }");
-        let text = text.replacen("acceleration = 100.0", &ends, 1).replacen("address = 1", &modes, 1);
-        let mut plc = Self::on(Settings { configuration: text, ..Settings::default() }, 64);
-        plc.connect();
-        plc.output[MODE] = VELOCITY;
-        plc.velocity(0);
-        plc.enable();
-        plc
-    }
-
-    /// Velocity of the turntable in the layout `mixed`, in counts, and 10 revolutions per second squared.
-    fn velocity(&mut self, velocity: i32) {
-        self.output[4..8].copy_from_slice(&velocity.to_le_bytes());
-        self.output[16..20].copy_from_slice(&(10 * TURN).to_le_bytes());
-    }
+/// Enabled in mode 2, with a drive of these modes and an axis with these limits of its travel, in revolutions.
+fn at_a_velocity(modes: &str, (min, max): (i32, i32)) -> Plc {
+    let modes = format!("address = 1\nmodes = [\"{modes}\"]");
+    let ends = format!("acceleration = 100.0\nposition_min = {min}.0\nposition_max = {max}.0");
+    let text = configuration("{ layout = \"mixed\" }");
+    let text = text.replacen("acceleration = 100.0", &ends, 1).replacen("address = 1", &modes, 1);
+    let mut plc = with(text);
+    plc.connect();
+    plc.set(0, "mode", 2);
+    plc.velocity(0);
+    plc.enable();
+    plc
 }
 
 /// A velocity toward a limit of the travel ends ahead of it, in velocity control too; behind the limit it is refused, and the axis stays
@@ -624,7 +486,7 @@ impl Plc {
 #[test]
 fn a_velocity_ends_ahead_of_the_limit_of_the_travel() {
     for modes in ["position", "velocity"] {
-        let mut plc = Plc::at_a_velocity(modes, (-2, 3));
+        let mut plc = at_a_velocity(modes, (-2, 3));
         for (velocity, end) in [(2 * TURN, 3 * NANO), (-2 * TURN, -2 * NANO)] {
             plc.velocity(velocity);
             let mut furthest = plc.place();
@@ -643,7 +505,7 @@ fn a_velocity_ends_ahead_of_the_limit_of_the_travel() {
 #[test]
 fn a_velocity_away_from_a_limit_behind_the_axis_is_refused() {
     for modes in ["position", "velocity"] {
-        let mut plc = Plc::at_a_velocity(modes, (-100, -1));
+        let mut plc = at_a_velocity(modes, (-100, -1));
         plc.velocity(TURN);
         plc.run_for(500);
         assert_eq!(plc.refusal(), Refusal::BEYOND_LIMIT, "{modes}");
@@ -657,14 +519,14 @@ fn a_velocity_away_from_a_limit_behind_the_axis_is_refused() {
 
 #[test]
 fn a_second_owner_and_wrong_sizes_are_refused_and_readers_are_served_beside() {
-    let mut plc = Plc::in_motion();
+    let mut plc = in_motion();
     let owner = plc.open;
     assert_eq!(plc.ask_open(layout::OUTPUT_POINT, (38, 42)).1, 0x106);
     assert_eq!(plc.ask_open(layout::OUTPUT_POINT, (39, 42)).1, 0x127);
     assert_eq!(plc.ask_open(layout::OUTPUT_POINT, (38, 43)).1, 0x128);
     assert_eq!(plc.open, owner);
     // The exchange of the refusals has taken time in which nothing was sent.
-    let mut plc = Plc::in_motion();
+    let mut plc = in_motion();
     let (owner, sent) = (plc.open, plc.sent);
     assert_eq!(plc.ask_open(layout::INPUT_ONLY_POINT, (2, 42)).0, 0);
     let reader = T_TO_O_ID + u32::from(plc.serial);
@@ -698,46 +560,24 @@ fn counts(revolutions: f64) -> i64 {
     (revolutions * f64::from(TURN)).round() as i64
 }
 
-impl Plc {
-    /// Enabled with the layout of cyclic positions.
-    fn cyclic() -> Self {
-        let mut plc = Self::new("{ layout = \"motion\" }");
-        plc.connect();
-        plc.enable();
-        plc
-    }
-
-    /// Sends the curve for so many milliseconds; the stamps are that far ahead, if there are some. Returns the largest distance
-    /// of the drive from the curve at the instant of the stamp, in nanounits, and the fastest it was.
-    fn follow(&mut self, millis: i64, ahead: Option<DurationNs>) -> (i64, i64) {
-        let start = self.rig.now();
-        let (mut away, mut fastest) = (0, 0);
-        for _ in 0..millis / 4 {
-            let seconds = |span: DurationNs| profile_generic::cast::f64_from_i64(span.as_nanos()) / 1e9;
-            let passed = self.rig.now().since(start);
-            let set_point = counts(curve(seconds(passed + ahead.unwrap_or(DurationNs::ZERO))));
-            self.output[8..16].copy_from_slice(&set_point.to_le_bytes());
-            let stamp = ahead.map_or(0, |ahead| self.rig.system().0 + ahead.magnitude());
-            self.output[16..24].copy_from_slice(&stamp.to_le_bytes());
-            self.scan();
-            let here = counts(curve(seconds(self.rig.now().since(start)))) * 1_000;
-            away = away.max((self.place() - here).abs());
-            fastest = fastest.max(self.speed().abs());
-        }
-        (away, fastest)
-    }
+/// Enabled with the layout of cyclic positions.
+fn cyclic() -> Plc {
+    let mut plc = plc("{ layout = \"motion\" }");
+    plc.connect();
+    plc.enable();
+    plc
 }
 
 #[test]
 fn cyclic_set_points_are_followed_with_stamps_at_their_instants() {
-    let mut plc = Plc::cyclic();
+    let mut plc = cyclic();
     let (away, fastest) = plc.follow(2_200, Some(RPI * 3));
     assert!((plc.place() - 2 * NANO).abs() < NANO / 1_000, "{}", plc.place());
     assert!((2 * NANO - NANO / 20..=2 * NANO + NANO / 20).contains(&fastest), "{fastest}");
     let stamped = away;
     assert!(plc.is(Status::ENABLED | Status::SYNCHRONIZED));
 
-    let mut plc = Plc::cyclic();
+    let mut plc = cyclic();
     let (away, fastest) = plc.follow(2_200, None);
     assert!((plc.place() - 2 * NANO).abs() < NANO / 1_000, "{}", plc.place());
     assert!((2 * NANO - NANO / 20..=2 * NANO + NANO / 20).contains(&fastest), "{fastest}");
@@ -756,7 +596,7 @@ fn cyclic_set_points_are_followed_with_stamps_at_their_instants() {
 
 #[test]
 fn stale_stamps_and_a_jump_stop_the_axis() {
-    let mut plc = Plc::cyclic();
+    let mut plc = cyclic();
     plc.follow(500, Some(RPI * 3));
     let stale = (plc.rig.system().0 - 1_000_000_000).to_le_bytes();
     for _ in 0..20 {
@@ -767,7 +607,7 @@ fn stale_stamps_and_a_jump_stop_the_axis() {
     assert_eq!(fault, Some(FaultCause::COMMAND_LOST));
     plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
 
-    let mut plc = Plc::cyclic();
+    let mut plc = cyclic();
     plc.follow(500, Some(RPI * 3));
     let place = plc.place();
     plc.output[8..16].copy_from_slice(&i64::from(5 * TURN).to_le_bytes());
@@ -780,21 +620,15 @@ fn stale_stamps_and_a_jump_stop_the_axis() {
 
 #[test]
 fn set_points_that_stop_coming_in_run_are_a_lost_command() {
-    let mut plc = Plc::cyclic();
+    let mut plc = cyclic();
     plc.follow(500, None);
     let [low, high, ..] = plc.sent.to_le_bytes();
     let sequence_count = u16::from_le_bytes([low, high]);
     // The same sequence count again and again keeps the connection, and is no set-point.
     for _ in 0..20 {
-        let header = 1_u32.to_le_bytes();
-        let data = [&header[..], &plc.output].concat();
-        let (connection_id, _) = plc.open.unwrap();
+        let data = plc.data();
         plc.sent += 1;
-        let datagram =
-            Class1Datagram { connection_id, encapsulation_sequence: plc.sent, sequence_count, data: &data };
-        let mut bytes = vec![0; datagram.buffer_len()];
-        datagram.emit(&mut bytes).unwrap();
-        plc.rig.inject_datagram(&bytes, SocketAddrV4::new(plc.address, PLC_PORT));
+        plc.send_as(plc.sent, sequence_count, &data);
         plc.rig.run_for(RPI);
     }
     assert!(plc.rig.engine.assemblies()[0].owner().is_some(), "the connection lives");
@@ -809,7 +643,7 @@ fn the_assemblies_of_the_speed_profile_run_an_axis_both_ways() {
     let text = text.replacen("following_error = 0.5", limits, 1);
     let assembly = "assembly = { layout = \"speed\" }\n\n[device.identity]";
     let configuration = text.replacen("[device.identity]", assembly, 1);
-    let mut plc = Plc::on(Settings { configuration, ..Settings::fixed() }, 4);
+    let mut plc = Plc::new(Settings { configuration, ..Settings::fixed() }, RPI);
     plc.connect();
     let speed = |plc: &Plc| {
         let input = plc.input();
@@ -849,7 +683,7 @@ fn cyclic_velocities_and_torques_are_followed() {
     const CYCLIC_VELOCITY: u8 = 4;
     const CYCLIC_TORQUE: u8 = 5;
     let configuration = configuration("{ layout = \"mixed\" }");
-    let mut plc = Plc::on(Settings { configuration, ..Settings::default() }, 64);
+    let mut plc = with(configuration);
     plc.connect();
     plc.enable();
     plc.output[MODE] = CYCLIC_VELOCITY;

@@ -1,9 +1,10 @@
 //! `axisbridge demo`: the whole chain in one process.
 //!
-//! A CIP Motion controller on real TCP and UDP sockets, the box as `run` runs it, and behind it simulated drives inside the
+//! A CIP Motion controller or a PLC on real TCP and UDP sockets, the box as `run` runs it, and behind it simulated drives inside the
 //! process, which get and give the very same frames as on a wire: of SERCOS III, of CANopen, of DeviceNet, or
 //! one of each. Controller and gateway read the host's clock, or are two clocks that follow a third one ([`clocks`]).
 
+mod assembly;
 mod clocks;
 mod drives;
 mod page;
@@ -11,18 +12,21 @@ mod page;
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+pub use self::assembly::DemoNorth;
 pub use self::clocks::DemoTime;
 pub use self::drives::{DRIVES, DriveKind, configuration};
 pub use self::page::PAGE;
+
+use profile_cip::controller::ControllerConfig;
 
 use self::clocks::Clocks;
 
 use super::progress::Progress;
 use super::report::{AxisResult, RunResult, failure};
-use super::{CliError, DemoArguments, signal};
+use super::{CliError, DemoArguments, signal, usage};
 use crate::bundle::Files;
 use crate::config::Config;
 use crate::mapping::Mapping;
@@ -57,8 +61,18 @@ const CYCLIC_PHASE: u8 = 4;
 /// How often the start is looked at.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
 
+/// What came of the axes.
+struct Ran {
+    axes: Vec<AxisResult>,
+    failure: Option<String>,
+}
+
 /// Runs the demonstration.
 pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
+    let by_assembly = arguments.north == DemoNorth::Assembly;
+    if by_assembly && arguments.time == DemoTime::Ptp {
+        return Ok(usage("--north assembly has no time of its own: expected --time host"));
+    }
     let [stop, hurry] = signal::stop_and_hurry_on_signals()?;
     let mut progress = Progress::new(arguments.json);
     let clocks = match arguments.time {
@@ -67,6 +81,7 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     };
     let listen = clocks.as_ref().map_or(arguments.listen, |_| clocks::GATEWAY);
     let text = drives::configuration(&arguments.drives).replace(ADDRESS, &listen.to_string());
+    let text = if by_assembly { assembly::with_assemblies(&text) } else { text };
     let text = if clocks.is_some() { text.replace(clocks::SHARED, clocks::PTP) } else { text };
     let text = arguments.page.map_or_else(|| text.clone(), |address| page::with_page(&text, address));
     let config = Config::parse(&text, "demo.toml")?;
@@ -106,30 +121,12 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     }
     wait_until_ready(&running, &mut progress)?;
 
-    let controller_config = setup::controller(&mapping, &counts, UPDATE_PERIOD_US);
-    let steps = program::standard(&plans, seconds);
-    let told = program::titles(&plans);
-    let run = |endpoints, time: &mut ControllerTime, progress: &mut Progress| {
-        controller::run(endpoints, controller_config, time, steps, &stop, &mut |event| {
-            use profile_cip::controller::Event;
-            match event {
-                Event::StepStarted { step } => progress.step(told.get(*step).map_or("", String::as_str)),
-                Event::StepFinished { .. } => {}
-                event => progress.step(&event.to_string()),
-            }
-        })
-    };
-    let outcome = match &clocks {
-        Some(clocks) => clocks.controller.inside(|| {
-            clocks::wait_for_gateway(&running, &mut progress, &stop)?;
-            let mut time = clocks.controller_time(&mut progress, &stop)?;
-            let report = run(clocks::endpoints(), &mut time, &mut progress)?;
-            progress.step(&format!("time of the controller: {}", time.description()));
-            Ok::<_, CliError>(report)
-        })?,
-        None => ControllerTime::start(TimePlan::Host(ClockPlan::default()))
-            .map_err(CliError::from)
-            .and_then(|mut time| Ok(run(endpoints(listen), &mut time, &mut progress)?)),
+    let outcome = if by_assembly {
+        let address = endpoints(listen).target;
+        assembly::run(&config, address, (&plans, seconds), &mut progress, &stop).map_err(CliError::from)
+    } else {
+        let controller = setup::controller(&mapping, &counts, UPDATE_PERIOD_US);
+        cip_motion(seconds, &running, (clocks.as_ref(), listen), controller, &plans, &mut progress, &stop)
     };
     let status = running.status();
     let stopped = running.stop(&|| hurry.load(Ordering::Relaxed))?;
@@ -143,10 +140,47 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
     if !stopped.unrested.is_empty() {
         return Err(stopped.unrested.join("\n").into());
     }
-    let report = outcome?;
+    let Ran { axes, failure } = outcome?;
     let capture = Some(arguments.capture.display().to_string());
-    RunResult { axes: AxisResult::all(&plans, &report), capture, failure: failure(&report) }
-        .print(arguments.json)
+    RunResult { axes, capture, failure }.print(arguments.json)
+}
+
+/// Moves the axes by a CIP Motion controller.
+fn cip_motion(
+    seconds: f64,
+    running: &RunningBox,
+    (clocks, listen): (Option<&Clocks>, Ipv4Addr),
+    controller_config: ControllerConfig,
+    plans: &[AxisPlan],
+    progress: &mut Progress,
+    stop: &AtomicBool,
+) -> Result<Ran, CliError> {
+    let steps = program::standard(plans, seconds);
+    let told = program::titles(plans);
+    let run = |endpoints, time: &mut ControllerTime, progress: &mut Progress| {
+        controller::run(endpoints, controller_config, time, steps, stop, &mut |event| {
+            use profile_cip::controller::Event;
+            match event {
+                Event::StepStarted { step } => progress.step(told.get(*step).map_or("", String::as_str)),
+                Event::StepFinished { .. } => {}
+                event => progress.step(&event.to_string()),
+            }
+        })
+    };
+    let report = match clocks {
+        Some(clocks) => clocks.controller.inside(|| {
+            clocks::wait_for_gateway(running, progress, stop)?;
+            let mut time = clocks.controller_time(progress, stop)?;
+            let report = run(clocks::endpoints(), &mut time, progress)?;
+            progress.step(&format!("time of the controller: {}", time.description()));
+            Ok::<_, CliError>(report)
+        })??,
+        None => {
+            let mut time = ControllerTime::start(TimePlan::Host(ClockPlan::default()))?;
+            run(endpoints(listen), &mut time, progress)?
+        }
+    };
+    Ok(Ran { axes: AxisResult::all(plans, &report), failure: failure(&report) })
 }
 
 /// The controller has an address of its own on loopback, so that both ends have UDP port 2222.

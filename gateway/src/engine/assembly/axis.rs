@@ -29,7 +29,7 @@ use crate::engine::axis::{
     AxisChannel, Intent, NorthPoints, Owner, READY_TIME_OUT, START_TIME_OUT, StopSettings, Target, Updates,
     Wish,
 };
-use crate::engine::generator::{self, Misfit, POSITION, ProfileGenerator, Standstill};
+use crate::engine::generator::{self, Misfit, POSITION, ProfileGenerator, SetPoint, Standstill};
 
 /// Set-points of the controller that may be missed before the command counts as lost.
 const MAY_MISS: u32 = 4;
@@ -84,6 +84,8 @@ pub(super) struct PlcAxis {
     /// Target of the last movement, until another order.
     target: Option<Position>,
     done: bool,
+    /// The last set-point of the controller that was handed on.
+    last: Option<SetPoint>,
     start_taken: bool,
     refusal: Refusal,
     sequence: u32,
@@ -112,6 +114,7 @@ impl PlcAxis {
             followed: None,
             target: None,
             done: false,
+            last: None,
             start_taken: false,
             refusal: Refusal::NONE,
             sequence: 0,
@@ -139,7 +142,7 @@ impl PlcAxis {
         axis.retry_wish(now, system);
         self.standstill.watch(now, axis);
         if !axis.operates() {
-            (self.source, self.followed) = (Source::None, None);
+            (self.source, self.followed, self.last) = (Source::None, None, None);
         }
         let known = Axis { faulted: is_faulted(axis), operating: axis.operates() };
         let before = self.handshake.state();
@@ -149,9 +152,6 @@ impl PlcAxis {
         }
         if !output.control.contains(Control::START) {
             self.start_taken = false;
-        }
-        if refusal != Refusal::NONE {
-            self.refusal = refusal;
         }
         if reaction.contains(Reaction::LOSE) {
             self.lose(around, axis);
@@ -168,6 +168,10 @@ impl PlcAxis {
             (self.refusal, self.enabling, self.begun, self.has_operated) =
                 (Refusal::NONE, Some(now), None, false);
             (self.target, self.done) = (None, false);
+        }
+        // What was refused of the same word is shown, whatever else of it was carried out.
+        if refusal != Refusal::NONE {
+            self.refusal = refusal;
         }
         if around.link == Link::Run
             && let Some(refusal) = output.refusal
@@ -259,9 +263,9 @@ impl PlcAxis {
                 return self.brake(around, axis);
             }
             (self.mode, self.source, self.followed) = (output.mode, Source::None, None);
-            if is_cyclic(self.mode) {
-                axis.end_set_points();
-            }
+            self.last = None;
+            // Nobody has set-points until there is another source: the axis holds its position.
+            axis.end_set_points();
         }
         if reaction.contains(Reaction::HALT) {
             return self.brake(around, axis);
@@ -374,10 +378,24 @@ impl PlcAxis {
             Some(stamp) => Target::At(around.time.target_at(stamp), TargetUpdate::Interpolate),
             None => Target::Paced(paced_at),
         };
+        self.last = Some(self.handed(axis.instant_of(target), &command));
         let unusable = u32::from(output.refusal.is_some());
         let sequence = self.sequence;
         let points = NorthPoints { command, sequence, target, saturated: 0, unusable, is_counted: false };
         axis.take_set_points(now, system, points);
+    }
+
+    /// A set-point as it is handed on; a position has the velocity at which it is come to.
+    fn handed(&self, at: MonotonicTime, command: &AxisCommand) -> SetPoint {
+        let mut handed = SetPoint { at, position: command.position, velocity: command.velocity };
+        if self.mode == mode::CYCLIC_POSITION {
+            handed.velocity = match self.last {
+                Some(last) if at > last.at => velocity_between(&last, &handed),
+                Some(last) => last.velocity,
+                None => Velocity::ZERO,
+            };
+        }
+        handed
     }
 
     /// Brakes to standstill, and stays there.
@@ -401,6 +419,13 @@ impl PlcAxis {
             self.handshake.lock();
             return self.disable(around, axis);
         };
+        if let (Source::Cyclic, Some(last), Some(period)) = (&self.source, self.last, around.period) {
+            // Where the set-points have led it, and not where it is: the drive lags.
+            let mode =
+                if self.mode == mode::CYCLIC_VELOCITY { generator::VELOCITY } else { generator::POSITION };
+            self.source = Source::Generator(ProfileGenerator::behind(&last, mode, period, acceleration));
+            return;
+        }
         let mut generator = self.generator(around, axis, mode, acceleration);
         generator.profile.brake();
         self.source = Source::Generator(generator);
@@ -537,6 +562,14 @@ fn given(output: &AxisOutput) -> Option<Acceleration> {
     output.acceleration.filter(|given| *given != Acceleration::ZERO)
 }
 
+/// The velocity from one set-point to a later one.
+fn velocity_between(from: &SetPoint, to: &SetPoint) -> Velocity {
+    let way = i128::from(to.position.get()) - i128::from(from.position.get());
+    let span = i128::from(to.at.since(from.at).as_nanos().max(1));
+    let velocity = way * 1_000_000_000 / span;
+    Velocity(i64::try_from(velocity).unwrap_or(if way < 0 { i64::MIN } else { i64::MAX }))
+}
+
 fn refusal(misfit: Misfit) -> Refusal {
     match misfit {
         Misfit::Mode(_) => Refusal::MODE,
@@ -545,10 +578,6 @@ fn refusal(misfit: Misfit) -> Refusal {
         Misfit::TooSteep(_) => Refusal::TOO_STEEP,
         Misfit::Beyond(_) => Refusal::BEYOND_LIMIT,
     }
-}
-
-fn is_cyclic(mode: u8) -> bool {
-    matches!(mode, mode::CYCLIC_POSITION | mode::CYCLIC_VELOCITY | mode::CYCLIC_TORQUE)
 }
 
 fn is_faulted(axis: &AxisChannel) -> bool {

@@ -17,8 +17,10 @@ mod parameters;
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
+use profile_cip::assembly::layout::ASSEMBLY_LEN_MAX;
 use profile_cip::assembly::{Assemblies, Link, Scale};
-use profile_cip::device::motion_link::{ExplicitReply, MotionReply, MotionRequest, Token};
+use profile_cip::device::motion_link::{ExplicitReply, ExplicitRequest, MotionReply, MotionRequest, Token};
+use profile_cip::device::objects::assembly::is_data;
 use profile_cip::device::visualization::{self, Indication, NetworkCondition};
 use profile_cip::wire::status::GeneralStatus;
 use profile_generic::time::{DurationNs, MonotonicTime};
@@ -36,6 +38,9 @@ use crate::north::DeviceEnd;
 
 /// Explicit requests handled in one cycle.
 const REQUESTS_PER_CYCLE: usize = parameters::REQUESTS_MAX;
+
+/// An output assembly of which nothing counts.
+const ZEROS: [u8; ASSEMBLY_LEN_MAX] = [0; ASSEMBLY_LEN_MAX];
 
 /// An axis of a device with assemblies.
 #[derive(Debug, Clone, Copy)]
@@ -154,6 +159,9 @@ impl AssemblyChannel {
                     self.connections.close(close.o_to_t_id);
                     MotionReply::Closed { token: close.token }
                 }
+                MotionRequest::Explicit(explicit) if is_data(&explicit.path) => {
+                    MotionReply::Explicit(self.data_of(&explicit))
+                }
                 MotionRequest::Explicit(explicit) => match self.parameters.push(explicit) {
                     Ok(()) => continue,
                     Err(token) => {
@@ -177,6 +185,24 @@ impl AssemblyChannel {
         self.connections.end_listen_only();
         while let Some(o_to_t_id) = self.connections.poll_ended() {
             let _ = self.link.reply(MotionReply::ConnectionLost { o_to_t_id, silent_us: 0 });
+        }
+    }
+
+    /// The data of an assembly for an explicit request: of the input what is sent next, of the output what counts, which is nothing
+    /// while no owner is in run.
+    fn data_of(&self, request: &ExplicitRequest) -> ExplicitReply {
+        let is = |point: u16| request.path.instance == u32::from(point);
+        let mut reply = ExplicitReply::status(request.token, GeneralStatus::SUCCESS.0);
+        let data: &[u8] = if is(self.assemblies.input_point()) {
+            &self.input
+        } else if is(self.assemblies.output_point()) {
+            self.connections.output().unwrap_or(&ZEROS[..self.assemblies.output_len()])
+        } else {
+            &[]
+        };
+        match reply.data.try_extend_from_slice(data) {
+            Ok(()) => reply,
+            Err(_) => ExplicitReply::status(request.token, GeneralStatus::REPLY_DATA_TOO_LARGE.0),
         }
     }
 

@@ -6,7 +6,7 @@
 
 use super::guard::Finding;
 use super::set_points::{Before, Updates};
-use super::{AxisChannel, Intent, Loss, NorthPoints, Owner, Reactions, StopSettings, Wish};
+use super::{AxisChannel, Intent, Loss, NorthPoints, Owner, Reactions, StopSettings, Target, Wish};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::hookup::TestOrder;
 use profile_generic::image::{AxisCommand, StatusBits};
@@ -243,6 +243,12 @@ impl AxisChannel {
     ) {
         self.set_points.take(sequence);
         self.raise(now, system, Fault::new(cause, system));
+    }
+
+    /// The instant at which set-points with this target are to be reached.
+    #[must_use]
+    pub fn instant_of(&self, target: Target) -> MonotonicTime {
+        self.set_points.target(target).1
     }
 
     /// Takes set-points for the interpolator. A number that was taken before has no effect.

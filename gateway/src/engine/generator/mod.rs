@@ -47,7 +47,18 @@ const REST_TIME: DurationNs = DurationNs::from_millis(20);
 pub(super) struct ProfileGenerator {
     pub profile: MotionProfile,
     pub mode: ModeSelection,
+    /// Time between two set-points.
+    period: DurationNs,
     next: MonotonicTime,
+}
+
+/// A set-point that was handed to an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct SetPoint {
+    /// The instant that it is for.
+    pub at: MonotonicTime,
+    pub position: Position,
+    pub velocity: Velocity,
 }
 
 impl ProfileGenerator {
@@ -69,7 +80,14 @@ impl ProfileGenerator {
             let position = Position(feedback.position.get().saturating_add(travel));
             MotionProfile::moving(position, feedback.velocity, braking)
         };
-        Self { profile, mode, next: now }
+        Self { profile, mode, period: UPDATE_PERIOD, next: now }
+    }
+
+    /// A profile that brakes in this mode, from the last set-point of somebody who has sent one in each `period`. It is the next one of
+    /// them: what the axis is to do until then stays as it is.
+    pub fn behind(last: &SetPoint, mode: ModeSelection, period: DurationNs, braking: Acceleration) -> Self {
+        let profile = MotionProfile::moving(last.position, last.velocity, braking);
+        Self { profile, mode, period, next: last.at - period }
     }
 
     /// Moves at a velocity. In position control it stops at the end of travel; velocity control brakes ahead of it while it runs.
@@ -83,7 +101,7 @@ impl ProfileGenerator {
 
     /// The next set-points that are due.
     pub fn poll(&mut self, now: MonotonicTime, axis: &AxisChannel) -> Option<AxisCommand> {
-        if now.since(self.next) > UPDATE_PERIOD * CATCH_UP_MAX {
+        if now.since(self.next) > self.period * CATCH_UP_MAX {
             self.next = now;
         }
         if now < self.next {
@@ -92,16 +110,16 @@ impl ProfileGenerator {
         if self.mode == VELOCITY && reach::runs_beyond(axis, self.profile.acceleration(), REACTION) {
             self.profile.brake();
         }
-        self.profile.step(UPDATE_PERIOD);
+        self.profile.step(self.period);
         let mut command = AxisCommand {
             position: self.profile.position(),
             velocity: self.profile.velocity(),
             present: if self.mode == POSITION { CommandSet::POSITION } else { CommandSet::VELOCITY },
-            target_time: Some(self.next + UPDATE_PERIOD * 2),
+            target_time: Some(self.next + self.period * 2),
             ..AxisCommand::default()
         };
         command.select(self.mode);
-        self.next = self.next + UPDATE_PERIOD;
+        self.next = self.next + self.period;
         Some(command)
     }
 }

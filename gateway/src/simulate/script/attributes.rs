@@ -95,7 +95,7 @@ pub(super) fn data_type(keys: &mut Keys<'_, '_>) -> Option<Option<CipType>> {
 }
 
 /// The name most like this one, if any is.
-pub(super) fn nearest<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<&'n str> {
+pub(in crate::simulate) fn nearest<'n>(name: &str, known: impl Iterator<Item = &'n str>) -> Option<&'n str> {
     let distance = |other: &str| distance(&folded(name), &folded(other));
     known
         .map(|other| (distance(other), other))

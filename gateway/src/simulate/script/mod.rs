@@ -17,14 +17,14 @@
 //! The whole file is read and checked before anything is sent: every key, every name of the standard, every value, and
 //! whether a step can succeed at all. Every problem is reported at its place.
 
-mod attributes;
+pub(in crate::simulate) mod attributes;
 mod connection;
 mod events;
 mod exchange;
 mod expect;
 mod misbehave;
 mod motion;
-mod reader;
+pub(in crate::simulate) mod reader;
 pub mod schema;
 mod step;
 #[cfg(test)]

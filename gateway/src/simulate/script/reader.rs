@@ -12,11 +12,11 @@ use crate::config::duration;
 use crate::finding::{Problem, registry as code};
 
 /// A value with its place.
-pub(super) type Value<'t> = Spanned<DeValue<'t>>;
+pub(in crate::simulate) type Value<'t> = Spanned<DeValue<'t>>;
 
 /// Where problems are collected, so that one look at a file finds them all.
 #[derive(Debug, Default)]
-pub(super) struct Problems(RefCell<Vec<Problem>>);
+pub(in crate::simulate) struct Problems(RefCell<Vec<Problem>>);
 
 impl Problems {
     /// Adds one; `None`, so that it can be returned.
@@ -33,7 +33,7 @@ impl Problems {
 }
 
 /// What kind of value this is, for people.
-pub(super) fn kind(value: &DeValue<'_>) -> &'static str {
+pub(in crate::simulate) fn kind(value: &DeValue<'_>) -> &'static str {
     match value {
         DeValue::String(_) => "a string",
         DeValue::Integer(_) => "a whole number",
@@ -46,7 +46,7 @@ pub(super) fn kind(value: &DeValue<'_>) -> &'static str {
 }
 
 /// A table whose keys are taken one after the other; what nobody has taken is an unknown key.
-pub(super) struct Keys<'a, 't> {
+pub(in crate::simulate) struct Keys<'a, 't> {
     what: &'a str,
     table: &'a DeTable<'t>,
     span: Range<usize>,
@@ -55,7 +55,7 @@ pub(super) struct Keys<'a, 't> {
 }
 
 /// The table in a value.
-pub(super) fn table<'a, 't>(
+pub(in crate::simulate) fn table<'a, 't>(
     value: &'a Value<'t>,
     what: &'a str,
     problems: &'a Problems,
@@ -71,7 +71,7 @@ pub(super) fn table<'a, 't>(
 }
 
 /// Tells a value that is of the wrong kind or has no meaning.
-pub(super) fn wrong<T>(
+pub(in crate::simulate) fn wrong<T>(
     value: &Value<'_>,
     key: &str,
     expected: impl Display,
@@ -88,13 +88,13 @@ pub(super) fn wrong<T>(
 }
 
 /// A whole number as it is written, in any radix.
-pub(super) fn whole(value: &Value<'_>) -> Option<i128> {
+pub(in crate::simulate) fn whole(value: &Value<'_>) -> Option<i128> {
     let integer = value.get_ref().as_integer()?;
     i128::from_str_radix(integer.as_str(), integer.radix()).ok()
 }
 
 /// A number; whole ones count too.
-pub(super) fn number(value: &Value<'_>) -> Option<f64> {
+pub(in crate::simulate) fn number(value: &Value<'_>) -> Option<f64> {
     match value.get_ref() {
         DeValue::Float(float) => float.as_str().parse().ok(),
         // Decimal digits give the nearest number; other radixes only say small ones.
@@ -105,7 +105,7 @@ pub(super) fn number(value: &Value<'_>) -> Option<f64> {
 }
 
 /// A list of words, each from the set.
-pub(super) fn words<T: Copy>(
+pub(in crate::simulate) fn words<T: Copy>(
     value: &Value<'_>,
     key: &str,
     set: &[(&str, T)],
@@ -121,7 +121,7 @@ pub(super) fn words<T: Copy>(
 
 /// Letters and digits alone, in small letters: how names are compared. Where signs stand side by side, as in the names
 /// of marker events, they count as well.
-pub(super) fn folded(name: &str) -> String {
+pub(in crate::simulate) fn folded(name: &str) -> String {
     let is_sign = |c: Option<&char>| matches!(c, Some('+' | '-'));
     let letters: Vec<char> = name.chars().collect();
     let mut folded = String::with_capacity(name.len());
@@ -136,7 +136,7 @@ pub(super) fn folded(name: &str) -> String {
 }
 
 /// A word from the set; spelling differs in capitals, blanks and dashes at will.
-pub(super) fn word_of<T: Copy>(
+pub(in crate::simulate) fn word_of<T: Copy>(
     value: &Value<'_>,
     key: &str,
     set: &[(&str, T)],
@@ -317,7 +317,7 @@ impl<'a, 't> Keys<'a, 't> {
 }
 
 /// A time with its unit.
-pub(super) fn time(value: &Value<'_>, key: &str, problems: &Problems) -> Option<DurationNs> {
+pub(in crate::simulate) fn time(value: &Value<'_>, key: &str, problems: &Problems) -> Option<DurationNs> {
     let DeValue::String(text) = value.get_ref() else {
         return wrong(value, key, duration::EXPECTED, problems);
     };
@@ -328,7 +328,7 @@ pub(super) fn time(value: &Value<'_>, key: &str, problems: &Problems) -> Option<
 }
 
 /// Bytes in hex, with blanks at will.
-pub(super) fn hex(value: &Value<'_>, key: &str, problems: &Problems) -> Option<Vec<u8>> {
+pub(in crate::simulate) fn hex(value: &Value<'_>, key: &str, problems: &Problems) -> Option<Vec<u8>> {
     const EXPECTED: &str = "bytes in hex, such as \"01 00 B9 01\"";
     let DeValue::String(text) = value.get_ref() else { return wrong(value, key, EXPECTED, problems) };
     let digits: Vec<u32> =

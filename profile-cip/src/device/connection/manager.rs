@@ -30,7 +30,11 @@ pub const LISTENERS_MAX: usize = 8;
 /// Most connections at once: the motion connection and the explicit ones. Connection numbers are below it.
 pub const CONNECTIONS_MAX: u16 = 33;
 
+/// The same of a device with assemblies, where those that listen come last.
+pub const ASSEMBLY_CONNECTIONS_MAX: u16 = 41;
+
 const _: () = assert!(CONNECTIONS_MAX as usize == EXPLICIT_CONNECTIONS_MAX + 1);
+const _: () = assert!(ASSEMBLY_CONNECTIONS_MAX as usize == CONNECTIONS_MAX as usize + LISTENERS_MAX);
 
 /// Most explicit connections of one session, so that one peer cannot take them all.
 pub const EXPLICIT_PER_SESSION_MAX: usize = 8;
@@ -57,6 +61,8 @@ pub(crate) enum Motion {
 /// Who has the motion connection, and on which terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Owner {
+    /// The same as long as the connection lives: 0, or of those that listen from [`CONNECTIONS_MAX`] on.
+    pub number: u16,
     pub open: OpenParameters,
     pub peer: SocketAddrV4,
     /// Time-out multiplier code of the Forward_Open.
@@ -71,12 +77,17 @@ pub(crate) struct Asked {
 }
 
 impl Motion {
-    /// The connection, unless closed.
-    pub fn parameters(&self) -> Option<&OpenParameters> {
+    /// Who has the connection, unless closed.
+    pub fn owner(&self) -> Option<&Owner> {
         match self {
             Self::Closed => None,
-            Self::Opening(owner, _) | Self::Open(owner) | Self::Closing(owner, _) => Some(&owner.open),
+            Self::Opening(owner, _) | Self::Open(owner) | Self::Closing(owner, _) => Some(owner),
         }
+    }
+
+    /// The connection, unless closed.
+    pub fn parameters(&self) -> Option<&OpenParameters> {
+        self.owner().map(|owner| &owner.open)
     }
 
     /// When the motion device is given up.
@@ -160,8 +171,19 @@ impl ConnectionManager {
     }
 
     /// The motion connection, or that of the owner of assemblies, and those that listen.
+    pub fn io(&self) -> impl Iterator<Item = &Motion> {
+        std::iter::once(&self.motion).chain(&self.listeners).filter(|one| **one != Motion::Closed)
+    }
+
     fn all_io(&self) -> impl Iterator<Item = &OpenParameters> {
-        std::iter::once(&self.motion).chain(&self.listeners).filter_map(Motion::parameters)
+        self.io().filter_map(Motion::parameters)
+    }
+
+    /// Number of another connection that listens.
+    pub fn listener_number(&self) -> u16 {
+        let taken = |number: u16| self.io().filter_map(Motion::owner).any(|owner| owner.number == number);
+        // There are as many numbers as places, and a place is free.
+        (CONNECTIONS_MAX..ASSEMBLY_CONNECTIONS_MAX).find(|number| !taken(*number)).unwrap_or(CONNECTIONS_MAX)
     }
 
     /// Fails unless another connection to assemblies can be opened in this role.

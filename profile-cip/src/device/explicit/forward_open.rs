@@ -179,7 +179,9 @@ fn open_io(
         assembly,
     };
     node.ask(MotionRequest::Open(parameters)).map_err(|status| Refusal::new(status, 0))?;
-    let owner = Owner { open: parameters, peer: origin.peer, multiplier: open.timeout_multiplier };
+    let is_owner = assembly.is_none_or(|assembly| assembly.role == AssemblyRole::ExclusiveOwner);
+    let number = if is_owner { 0 } else { node.connections.listener_number() };
+    let owner = Owner { number, open: parameters, peer: origin.peer, multiplier: open.timeout_multiplier };
     let asked = Asked { token: parameters.token, deadline: origin.now + DEVICE_TIMEOUT };
     let opening = Motion::Opening(owner, asked);
     match assembly {

@@ -11,7 +11,9 @@ use super::adapter::{DEVICE_TIMEOUT, SessionSlot};
 use super::reset::{self, Reset};
 use super::{forward_close, forward_open};
 use crate::device::config::{AdapterConfig, QosConfig};
-use crate::device::connection::manager::{CONNECTIONS_MAX, ConnectionManager, Motion, Owner};
+use crate::device::connection::manager::{
+    ASSEMBLY_CONNECTIONS_MAX, CONNECTIONS_MAX, ConnectionManager, Motion, Owner,
+};
 use crate::device::connection::refusal::Refusal;
 use crate::device::counters::Counters;
 use crate::device::event::Event;
@@ -19,8 +21,10 @@ use crate::device::motion_link::{
     AssemblyOpen, CloseParameters, ConnectionTriad, ExplicitRequest, MotionReply, MotionRequest, ObjectPath,
     OpenParameters, Token,
 };
+use crate::device::objects::assembly::{self, Outcome};
 use crate::device::objects::class::{
-    CLASS_AXIS_PARAMETER, CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER, CLASS_MOTION_DEVICE_AXIS,
+    CLASS_ASSEMBLY, CLASS_AXIS_PARAMETER, CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER,
+    CLASS_MOTION_DEVICE_AXIS,
 };
 use crate::device::objects::connection_manager::{self, Statistics};
 use crate::device::objects::ethernet_link::{CLASS_ETHERNET_LINK, Cleared, EthernetLink, GET_AND_CLEAR};
@@ -192,6 +196,14 @@ impl Node {
         if self.is_foreign(client, path.class, request.service) {
             return self.refuse(request.service, GeneralStatus::PRIVILEGE_VIOLATION);
         }
+        if path.class == CLASS_ASSEMBLY
+            && let Some(assemblies) = &self.config.assembly
+        {
+            return match assembly::serve(assemblies, request.service, &path, request.data) {
+                Outcome::Data => self.hand_on(origin, &request, path),
+                Outcome::Done(answer) => self.answered(origin, request.service, answer),
+            };
+        }
         let answer = match (path.class, path.instance, request.service) {
             (CLASS_MOTION_DEVICE_AXIS, ..) if self.config.assembly.is_none() => {
                 return self.hand_on(origin, &request, path);
@@ -217,10 +229,14 @@ impl Node {
             }
             _ => self.attribute_service(origin, &request, &path),
         };
+        self.answered(origin, request.service, answer)
+    }
+
+    fn answered(&mut self, origin: &Origin, service: Service, answer: Answer) -> Step {
         if answer.status != GeneralStatus::SUCCESS {
             self.counters.requests_refused += 1;
         }
-        Step::Done(answer.into_reply(request.service, origin.reply_max))
+        Step::Done(answer.into_reply(service, origin.reply_max))
     }
 
     pub fn refuse(&mut self, service: Service, status: GeneralStatus) -> Step {
@@ -239,7 +255,7 @@ impl Node {
                 let has_axes = self.config.assembly.is_none();
                 let has_file = !self.config.eds.is_empty();
                 let mut router = MessageRouter {
-                    available: CONNECTIONS_MAX,
+                    available: self.connections_max(),
                     active: explicit + motion,
                     has_file,
                     has_axes,
@@ -248,7 +264,8 @@ impl Node {
             }
             CLASS_CONNECTION_MANAGER => {
                 let (counters, connections) = (&self.counters, &self.connections);
-                serve(&mut Statistics { counters, connections }, service, path, data, limit)
+                let available = self.connections_max();
+                serve(&mut Statistics { counters, connections, available }, service, path, data, limit)
             }
             CLASS_FILE if !self.config.eds.is_empty() => {
                 let Self { config, uploads, .. } = self;
@@ -290,6 +307,11 @@ impl Node {
             CLASS_ETHERNET_LINK => serve(&mut self.ethernet_link(), service, path, data, limit),
             _ => Answer::status(GeneralStatus::PATH_DESTINATION_UNKNOWN),
         }
+    }
+
+    /// Connections there can be.
+    fn connections_max(&self) -> u16 {
+        if self.config.assembly.is_some() { ASSEMBLY_CONNECTIONS_MAX } else { CONNECTIONS_MAX }
     }
 
     fn ethernet_link(&mut self) -> EthernetLink<'_> {

@@ -4,7 +4,7 @@
 //!
 //! | offset | size | field |
 //! |---|---|---|
-//! | 0 | 2 | connection number: 0 the motion connection, from 1 the explicit ones |
+//! | 0 | 2 | connection number: 0 the motion connection or the owner of assemblies, 1 to 32 the explicit ones, from 33 those that listen |
 //! | 2 | 2 | state: 1 configuring, 3 established, 6 closing |
 //! | 4 | 2 | originator port: where the request to open came from |
 //! | 6 | 2 | target port: where this device takes the connection's messages |
@@ -24,7 +24,7 @@ use core::net::Ipv4Addr;
 
 use super::object::{Answer, Object, data_status};
 use crate::device::config::InterfaceConfig;
-use crate::device::connection::manager::{CONNECTIONS_MAX, ConnectionManager, Explicit, Motion, Owner};
+use crate::device::connection::manager::{ConnectionManager, Explicit, Motion, Owner};
 use crate::device::counters::Counters;
 use crate::device::motion_link::ConnectionTriad;
 use crate::wire::status::GeneralStatus;
@@ -42,6 +42,8 @@ const CLOSING: u16 = 6;
 pub(crate) struct Statistics<'a> {
     pub counters: &'a Counters,
     pub connections: &'a ConnectionManager,
+    /// Connections there can be.
+    pub available: u16,
 }
 
 impl Object for Statistics<'_> {
@@ -76,10 +78,10 @@ impl Object for Statistics<'_> {
 impl Statistics<'_> {
     /// Connection Entry List: how many connections there can be, and a bit for each that is open.
     fn entry_list(&self, out: &mut Vec<u8>) {
-        out.extend(CONNECTIONS_MAX.to_le_bytes());
-        let mut bits = [0u8; CONNECTIONS_MAX.div_ceil(8) as usize];
-        let motion = self.connections.motion.parameters().is_some().then_some(0);
-        for number in self.connections.explicit.iter().map(|one| one.number).chain(motion) {
+        out.extend(self.available.to_le_bytes());
+        let mut bits = vec![0_u8; usize::from(self.available.div_ceil(8))];
+        let io = self.connections.io().filter_map(Motion::owner).map(|owner| owner.number);
+        for number in self.connections.explicit.iter().map(|one| one.number).chain(io) {
             if let Some(byte) = bits.get_mut(usize::from(number / 8)) {
                 *byte |= 1 << (number % 8);
             }
@@ -101,7 +103,8 @@ pub(crate) fn get(
         Err(error) => return Answer::status(data_status(error)),
     };
     let explicit = connections.explicit.iter().find(|one| one.number == number);
-    answer(interface, client, (number == 0).then_some(connections.motion), explicit)
+    let io = connections.io().find(|one| one.owner().is_some_and(|owner| owner.number == number));
+    answer(interface, client, io, explicit)
 }
 
 /// Search_Connection_Data: the connection of this triad.
@@ -116,21 +119,21 @@ pub(crate) fn search(
         Ok(triad) => triad,
         Err(error) => return Answer::status(data_status(error)),
     };
-    let of_motion = connections.motion.parameters().is_some_and(|open| open.triad == triad);
+    let io = connections.io().find(|one| one.parameters().is_some_and(|open| open.triad == triad));
     let explicit = connections.explicit.iter().find(|one| one.triad == triad);
-    answer(interface, client, of_motion.then_some(connections.motion), explicit)
+    answer(interface, client, io, explicit)
 }
 
 fn answer(
     interface: &InterfaceConfig,
     client: Ipv4Addr,
-    motion: Option<Motion>,
+    io: Option<&Motion>,
     explicit: Option<&Explicit>,
 ) -> Answer {
-    let mut data = match (motion, explicit) {
-        (Some(Motion::Opening(owner, _)), _) => motion_data(&owner, CONFIGURING, interface),
-        (Some(Motion::Open(owner)), _) => motion_data(&owner, ESTABLISHED, interface),
-        (Some(Motion::Closing(owner, _)), _) => motion_data(&owner, CLOSING, interface),
+    let mut data = match (io, explicit) {
+        (Some(Motion::Opening(owner, _)), _) => io_data(owner, CONFIGURING, interface),
+        (Some(Motion::Open(owner)), _) => io_data(owner, ESTABLISHED, interface),
+        (Some(Motion::Closing(owner, _)), _) => io_data(owner, CLOSING, interface),
         (_, Some(explicit)) => explicit_data(explicit, interface),
         (Some(Motion::Closed) | None, None) => {
             return Answer::status(GeneralStatus::PATH_DESTINATION_UNKNOWN);
@@ -157,17 +160,18 @@ struct ConnectionData {
     intervals_us: (u32, u32),
 }
 
-fn motion_data(owner: &Owner, state: u16, interface: &InterfaceConfig) -> ConnectionData {
+fn io_data(owner: &Owner, state: u16, interface: &InterfaceConfig) -> ConnectionData {
     let open = &owner.open;
+    let t_to_o_us = open.assembly.map_or(open.rpi_us, |assembly| assembly.t_to_o_rpi_us);
     ConnectionData {
-        number: 0,
+        number: owner.number,
         state,
         originator: *owner.peer.ip(),
         ports: (owner.peer.port(), interface.io_port),
         triad: open.triad,
         ids: (open.o_to_t_id, open.t_to_o_id),
         multiplier: owner.multiplier,
-        intervals_us: (open.rpi_us, open.rpi_us),
+        intervals_us: (open.rpi_us, t_to_o_us),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The Message Router object (class 0x02) and the way from a path to an object.
 
-use super::class::{CLASS_AXIS_PARAMETER, CLASS_MOTION_DEVICE_AXIS};
+use super::class::{CLASS_ASSEMBLY, CLASS_AXIS_PARAMETER, CLASS_MOTION_DEVICE_AXIS};
 use super::file::CLASS_FILE;
 use super::list::OBJECT_CLASSES;
 use super::object::Object;
@@ -56,7 +56,7 @@ pub(crate) struct MessageRouter {
     pub active: u16,
     /// Whether there is a file to serve.
     pub has_file: bool,
-    /// Whether there is a Motion Device Axis Object, or else one for the parameters of drives.
+    /// Whether there is a Motion Device Axis Object, or else assemblies and an object for the parameters of drives.
     pub has_axes: bool,
 }
 
@@ -71,9 +71,12 @@ impl Object for MessageRouter {
                 let classes = OBJECT_CLASSES.into_iter().map(|one| one.class);
                 let classes = classes.filter(|class| *class != CLASS_FILE || self.has_file);
                 let classes = classes.filter(|class| *class != CLASS_MOTION_DEVICE_AXIS || self.has_axes);
-                let classes = classes.chain((!self.has_axes).then_some(CLASS_AXIS_PARAMETER));
-                out.extend(u16::try_from(classes.clone().count()).unwrap_or(0).to_le_bytes());
-                out.extend(classes.flat_map(u16::to_le_bytes));
+                let of_assemblies =
+                    [CLASS_ASSEMBLY, CLASS_AXIS_PARAMETER].into_iter().filter(|_| !self.has_axes);
+                let mut classes: Vec<u16> = classes.chain(of_assemblies).collect();
+                classes.sort_unstable();
+                out.extend(u16::try_from(classes.len()).unwrap_or(0).to_le_bytes());
+                out.extend(classes.into_iter().flat_map(u16::to_le_bytes));
             }
             2 => out.extend(self.available.to_le_bytes()),
             3 => out.extend(self.active.to_le_bytes()),

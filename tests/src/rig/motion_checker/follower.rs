@@ -31,6 +31,10 @@ const BEGIN_OVERSHOOT: f64 = 0.25;
 /// Parts of a limit to spare, as the gateway's own supervision of it has.
 const SPARE: f64 = 0.1;
 
+/// How much more than its limit the acceleration may be from one cycle to the next where there is no curve: at the corners of a profile
+/// whose acceleration is a step, a polynomial between updates overshoots.
+const CORNERS: f64 = 2.0;
+
 /// Nanounits by which a conversion rounds: counts to generic units, and those to counts.
 const ROUNDING: f64 = 2.0;
 
@@ -46,6 +50,8 @@ const PERCENT: f64 = 1e4;
 pub enum Leader {
     /// The set-points of the controller.
     Controller,
+    /// A controller through assemblies, whose curve is not known: this is the limit of its acceleration, in nanounits per second squared.
+    Bounded(f64),
     /// The gateway's ramp to rest, at this deceleration in nanounits per second squared.
     Ramp(f64),
     /// The gateway holds it at rest.
@@ -206,6 +212,14 @@ impl Follower {
                 }
                 let change = Change { velocity, acceleration, resolution, overdue };
                 found.extend(self.follow(set_point, &change, curve, instant, statistics));
+            }
+            Leader::Bounded(most) => {
+                if let Some((acceleration, rounding)) = acceleration {
+                    let allowed = most * CORNERS * (1.0 + SPARE) + rounding;
+                    if acceleration.abs() > allowed {
+                        found.push(Finding::new(Rule::Acceleration, acceleration, -allowed, allowed, NANO));
+                    }
+                }
             }
             Leader::Ramp(deceleration) => {
                 let before = same.and_then(|last| last.velocity).map(|(before, _)| before);
@@ -409,6 +423,44 @@ mod tests {
         assert_eq!(take(reading(600, false), 4), []);
         let found = take(reading(600, true), 5);
         assert_eq!((found[0].rule, found[0].value), (Rule::Begin, 100.0 * 1_000.0 / 1e9));
+    }
+
+    #[test]
+    fn a_controller_without_a_curve_is_held_to_its_limits() {
+        let found = |counts: fn(i64) -> i64| {
+            let (mut follower, mut found) = (Follower::default(), Vec::new());
+            for cycle in 0..60 {
+                let counts = counts(cycle);
+                let set_point = SetPoint { quantity: Quantity::Position, counts, value: 0.0 };
+                let reading = Reading {
+                    mark: 0,
+                    follows: Some(set_point),
+                    actual_counts: counts,
+                    actual_velocity: 0.0,
+                };
+                let instant = Instant {
+                    at: MonotonicTime::ZERO + CYCLE * cycle,
+                    cycle,
+                    cycle_time: CYCLE,
+                    skew: Skew::default(),
+                    period: PERIOD,
+                    limit: Some(5e9),
+                };
+                let (curve, mut statistics) = (Curve::default(), Statistics::default());
+                let leader = Leader::Bounded(10e9);
+                found.extend(follower.take(&reading, &SCALING, leader, &curve, &instant, &mut statistics));
+            }
+            found.into_iter().map(|found| found.rule).collect::<Vec<_>>()
+        };
+        // 40 counts more in each cycle of 2 ms are 10 units/s².
+        assert_eq!(found(|cycle| 20 * cycle * cycle), []);
+        assert!(found(|cycle| 50 * cycle * cycle).contains(&Rule::Acceleration), "25 units/s²");
+        let jump = found(|cycle| if cycle < 30 { 0 } else { 1_000 });
+        assert_eq!(jump, [Rule::Acceleration, Rule::Acceleration], "there and back");
+        assert_eq!(
+            found(|cycle| 20 * 29 * cycle.min(30) + 20_000 * (cycle - 30).max(0)).last(),
+            Some(&Rule::Limit)
+        );
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! | the axis | its set-points |
 //! |---|---|
 //! | begins to follow | are where the drive is |
+//! | is led through assemblies | speed up and slow down by twice `limits.acceleration` at most: at the corners of a profile |
 //! | is held by the gateway | stand |
 //! | is stopped by the gateway's ramp | slow down by the configured deceleration at most |
 //! | moves by its drive: homing, positioning, halt | are not looked at |
@@ -116,6 +117,7 @@ struct Axis {
     bus: BusKind,
     drive: DriveAt,
     limit: Option<f64>,
+    acceleration: Option<f64>,
     grid: Grid,
     scaling: Option<Scaling>,
     mark: Option<u64>,
@@ -177,6 +179,7 @@ impl MotionChecker {
                 bus,
                 drive: axis.drive,
                 limit: axis.limits.velocity.map(|limit| f64_from_i64(limit.get())),
+                acceleration: axis.limits.acceleration.map(|limit| f64_from_i64(limit.get())),
                 grid: Grid::new(cycle),
                 scaling: None,
                 mark: None,
@@ -310,10 +313,11 @@ impl MotionChecker {
                 axis.curve.taken(now, id);
             }
         }
-        // What a controller commands through assemblies is not read here: its axes have no curve.
+        // What a controller commands through assemblies is not read here: its axes have no curve, and may have a limit.
         let by_assembly = |axis: usize| rig.engine.cip_program(axis).is_none();
+        let limit = |number| self.axes.iter().find(|axis| axis.number == number)?.acceleration;
         let leaders = rig.engine.axes().iter().enumerate().map(|(number, axis)| match leader(axis) {
-            Leader::Controller if by_assembly(number) => Leader::Other,
+            Leader::Controller if by_assembly(number) => limit(number).map_or(Leader::Other, Leader::Bounded),
             leader => leader,
         });
         let leaders = leaders.collect();

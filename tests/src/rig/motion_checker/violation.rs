@@ -9,7 +9,7 @@ use profile_generic::time::DurationNs;
 pub enum Rule {
     /// The velocity that the change since the last set-point means is one of the controller's curve.
     Velocity,
-    /// So is its acceleration.
+    /// So is its acceleration; without a curve it is within the limit of the axis.
     Acceleration,
     /// So is its torque.
     Torque,

@@ -136,6 +136,107 @@ fn what_does_not_fit_is_refused_with_what_would() {
     }
 }
 
+/// Sizes and numbers are answered at once, data by the motion device, and nothing can be set.
+#[test]
+fn the_assembly_object_has_data_and_sizes_that_cannot_be_set() {
+    const GET: Service = Service::GET_ATTRIBUTE_SINGLE;
+    const SET: Service = Service::SET_ATTRIBUTE_SINGLE;
+    let mut rig = rig();
+    let client = rig.client(1);
+    let path = |instance: u8, attribute: u8| [0x20, 4, 0x24, instance, 0x30, attribute];
+    for (instance, attribute, value) in [
+        (0, 1, 2_u16),
+        (0, 2, 153),
+        (0, 3, 5),
+        (0, 6, 7),
+        (0, 7, 4),
+        (150, 4, 32),
+        (100, 4, 40),
+        (151, 4, 0),
+        (152, 4, 0),
+        (153, 4, 0),
+    ] {
+        let answer = rig.ask(client, &message(GET, &path(instance, attribute), &[]));
+        assert_eq!((answer.status, answer.data), (0, value.to_le_bytes().to_vec()), "{instance} {attribute}");
+    }
+    for instance in [150, 100, 151] {
+        rig.send_unconnected(client, &message(GET, &path(instance, 3), &[]));
+        let Some(MotionRequest::Explicit(asked)) = rig.adapter.poll_motion() else { panic!("it asks") };
+        assert_eq!((asked.path.class, asked.path.instance), (4, u32::from(instance)));
+        let mut reply = ExplicitReply::status(asked.token, 0);
+        reply.data.try_extend_from_slice(&[instance; 20]).unwrap();
+        rig.complete(&MotionReply::Explicit(reply));
+        let answer = rig.unconnected_reply(client).0;
+        assert_eq!((answer.status, answer.data), (0, vec![instance; 20]));
+    }
+    for (service, path, data, status, what) in [
+        (SET, path(150, 3), &[0; 32][..], 0x0E, "only a connection moves axes"),
+        (SET, path(100, 3), &[0; 40], 0x0E, "the input is the device's"),
+        (SET, path(151, 3), &[], 0x0E, "the configuration has no data"),
+        (SET, path(150, 4), &[0; 2], 0x0E, "sizes are those of the layout"),
+        (SET, path(0, 1), &[0; 2], 0x0E, "so is the class"),
+        (SET, path(150, 9), &[], 0x14, "no such attribute"),
+        (GET, path(150, 1), &[], 0x14, "no list of members"),
+        (GET, path(150, 2), &[], 0x14, "no list of members"),
+        (GET, path(0, 4), &[], 0x14, "no such class attribute"),
+        (GET, path(149, 3), &[], 0x05, "no such assembly"),
+        (GET, path(100, 3), &[0], 0x15, "a read has no data"),
+        (Service::GET_ATTRIBUTES_ALL, path(100, 3), &[], 0x08, "no other service"),
+    ] {
+        let answer = rig.ask(client, &message(service, &path, data));
+        assert_eq!(answer.status, status, "{what}");
+    }
+    let answer = rig.ask(client, &message(GET, &[0x20, 4, 0x24, 100], &[]));
+    assert_eq!(answer.status, 4, "which attribute?");
+    let answer = rig.ask(client, &message(GET, &[0x20, 4, 0x24, 100, 0x28, 1, 0x30, 3], &[]));
+    assert_eq!(answer.status, 4, "members are no objects");
+    assert_eq!(rig.adapter.poll_motion(), None, "none of them reaches the axes");
+    let classes = rig.ask(client, &message(GET, &[0x20, 2, 0x24, 1, 0x30, 1], &[])).data;
+    let classes: Vec<_> =
+        classes[2..].chunks(2).map(|class| u16::from_le_bytes([class[0], class[1]])).collect();
+    assert!(classes.is_sorted() && classes.contains(&4) && classes.contains(&0x64), "{classes:x?}");
+
+    // Another address reads too while there is an owner.
+    opened(&mut rig, client, &open(1, OWNER));
+    let panel = rig.client(2);
+    assert_eq!(rig.ask(panel, &message(GET, &path(100, 4), &[])).data, [40, 0]);
+    assert_eq!(rig.ask(panel, &message(SET, &path(150, 3), &[0; 32])).status, 0x0F);
+    assert_eq!(rig.ask(client, &message(SET, &path(150, 3), &[0; 32])).status, 0x0E);
+}
+
+/// Get_Connection_Data and the Connection Entry List have the owner and those that listen, each with its number and intervals.
+#[test]
+fn connections_that_listen_are_listed_beside_the_owner() {
+    let mut rig = rig();
+    let (plc, panel) = (rig.client(1), rig.client(2));
+    let get = |number: u8| message(Service::GET_CONNECTION_DATA, PATH_MANAGER, &[number, 0]);
+    let search = |serial: u8| {
+        message(Service::SEARCH_CONNECTION_DATA, PATH_MANAGER, &[serial, 0, 1, 0, 0xFE, 0xCA, 0, 0])
+    };
+    assert_eq!(rig.get(plc, PATH_MANAGER, 9).data, [41, 0, 0, 0, 0, 0, 0, 0]);
+    let owner = opened(&mut rig, plc, &open(1, OWNER));
+    let input = opened(&mut rig, panel, &open(2, INPUT_ONLY));
+    let listen = opened(&mut rig, panel, &open(3, LISTEN_ONLY));
+    assert_eq!(rig.get(plc, PATH_MANAGER, 9).data, [41, 0, 1, 0, 0, 0, 0b0000_0110, 0], "0, 33 and 34");
+    let data = rig.ask(panel, &get(34)).data;
+    let (o_to_t, t_to_o) = (listen.o_to_t_id.to_le_bytes(), listen.t_to_o_id.to_le_bytes());
+    assert_eq!(data[..4], [34, 0, 3, 0], "established");
+    assert_eq!((&data[16..20], &data[36..40]), (&o_to_t[..], &t_to_o[..]));
+    // 2000 us one way, 4000 us the other.
+    assert_eq!((&data[28..32], &data[48..52]), (&[0xD0, 7, 0, 0][..], &[0xA0, 0x0F, 0, 0][..]));
+    assert_eq!(rig.ask(panel, &search(3)).data, data);
+    assert_eq!(rig.ask(plc, &get(34)).data[16..20], [0; 4], "whose connection it is not gets no ID");
+    assert_eq!(rig.ask(plc, &search(1)).data[..2], [0, 0]);
+    assert_eq!(rig.ask(plc, &get(0)).data[16..20], owner.o_to_t_id.to_le_bytes());
+    assert_eq!(rig.ask(plc, &get(35)).status, 5);
+    // A number that is free is given again, and the others stay.
+    rig.complete(&MotionReply::ConnectionLost { o_to_t_id: input.o_to_t_id, silent_us: 0 });
+    assert_eq!(rig.ask(panel, &get(33)).status, 5);
+    assert_eq!(rig.ask(panel, &search(3)).data[..2], [34, 0]);
+    opened(&mut rig, panel, &open(4, INPUT_ONLY));
+    assert_eq!(rig.ask(panel, &search(4)).data[..2], [33, 0]);
+}
+
 #[test]
 fn a_motion_device_has_no_assemblies() {
     let mut rig = Rig::new();
