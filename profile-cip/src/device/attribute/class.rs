@@ -26,7 +26,7 @@ pub(in crate::device) fn complete(
     if facts.sync_threshold.is_none() {
         class.retain(|row| !matches!(row.id, id::SYNC_VARIANCE | id::SYNC_THRESHOLD | id::SYNC_UPDATE_DELAY));
     }
-    let last = class.iter().map(|row| row.id).max().unwrap_or(0).max(id::STEP_THRESHOLD);
+    let last = class.iter().map(|row| row.id).max().unwrap_or(0).max(id::CONNECTION_CONFIGURATION_BITS);
     let axes = i64::try_from(facts.axes).unwrap_or(i64::MAX);
     for row in &mut class {
         match row.id {
