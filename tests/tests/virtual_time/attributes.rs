@@ -314,6 +314,36 @@ fn what_only_the_drive_can_change_is_confirmed_or_refused_with_both_values_in_th
     assert_eq!(told.matches("attribute 1319 cannot be set to").count(), 2, "{told}");
 }
 
+/// 255 in an array of actions leaves that exception as it is, as controllers write it that change one of them. An array with a value that an
+/// exception cannot have changes none.
+#[test]
+fn an_action_of_255_leaves_an_exception_as_it_is() {
+    const ACTION: u16 = 672;
+    const ACTION_MFG: u16 = 673;
+    /// Motor Overspeed User Limit, which Axisbridge watches itself; Bus Undervoltage, for which the drive switches itself off.
+    const OVERSPEED: usize = 4;
+    const UNDERVOLTAGE: usize = 33;
+    let (mut rig, client) = rig_in(AxisState::Stopped);
+    let mut ask = |service, id, value: &[u8]| client.ask(&mut rig, service, 1, Some(id), value);
+    for id in [ACTION, ACTION_MFG] {
+        let (_, before) = ask(GET, id, &[]);
+        assert!(before.len() == 64 && before.iter().any(|action| *action != 255), "{id}: {before:?}");
+        assert_eq!(ask(SET, id, &[255; 64]).0, OK, "{id}");
+        assert_eq!(ask(GET, id, &[]), (OK, before), "{id}: nothing has changed");
+    }
+    let (_, before) = ask(GET, ACTION, &[]);
+    let mut actions = [255; 64];
+    actions[OVERSPEED] = 1;
+    assert_eq!(ask(SET, ACTION, &actions).0, OK);
+    let mut expected = before;
+    assert_ne!(expected[OVERSPEED], 1);
+    expected[OVERSPEED] = 1;
+    assert_eq!(ask(GET, ACTION, &[]), (OK, expected.clone()), "one of them");
+    (actions[OVERSPEED], actions[UNDERVOLTAGE]) = (2, 0);
+    assert_eq!(ask(SET, ACTION, &actions).0, INVALID_VALUE);
+    assert_eq!(ask(GET, ACTION, &[]), (OK, expected), "one bad member");
+}
+
 /// What the first drive has as its window of the position error.
 fn window(rig: &mut Rig) -> i64 {
     match rig.can.first_mut() {
