@@ -12,10 +12,10 @@ use profile_generic::ratio::{Ratio, Rounding, quotient};
 use super::drive_program::DriveProgram;
 
 /// The most parameters and signals that one value is computed from.
-pub const READS_MAX: usize = 24;
+pub const READS_MAX: usize = 36;
 
 /// The most rows that a value is computed by, its own included.
-pub const ROWS_MAX: usize = 16;
+pub const ROWS_MAX: usize = 20;
 
 /// Something that a row computes with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,12 +149,19 @@ pub enum Control {
 }
 
 /// What is known of the reads of a [`Computation`], in their order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Known {
     /// Each of them.
     pub facts: [Fact; READS_MAX],
     /// What controls the axis.
     pub control: Control,
+}
+
+// Longer arrays have no default of their own.
+impl Default for Known {
+    fn default() -> Self {
+        Self { facts: [Fact::default(); READS_MAX], control: Control::default() }
+    }
 }
 
 /// Why there is no value.

@@ -331,7 +331,7 @@ pub struct DriveProgram {
     pub(super) shares_target: bool,
 }
 
-/// Most values of parameters that a drive does not show: those of the nameplates, the number of the power stage, and the encoder that an
+/// Most values of parameters that a drive does not show: those of the configuration, the number of the power stage, and the encoder that an
 /// axis goes by.
 pub const DATA_MAX: usize = OF_CONFIGURATION.len() + 2;
 

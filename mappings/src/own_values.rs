@@ -2,8 +2,8 @@
 
 use profile_generic::parameter::Parameter;
 
-/// What the nameplates in a configuration can say of motor, power stage and encoder.
-pub const OF_CONFIGURATION: [Parameter; 42] = [
+/// What a configuration can say of motor, power stage, encoder and control loops.
+pub const OF_CONFIGURATION: [Parameter; 47] = [
     Parameter::MOTOR_RATED_TORQUE,
     Parameter::MOTOR_RATED_CURRENT,
     Parameter::MOTOR_PEAK_CURRENT,
@@ -46,6 +46,11 @@ pub const OF_CONFIGURATION: [Parameter; 42] = [
     Parameter::ENABLE_INPUT_CHECKING,
     Parameter::MOTOR_THERMAL_TIME,
     Parameter::DRIVE_THERMAL_TIME,
+    Parameter::POSITION_LOOP_GAIN,
+    Parameter::POSITION_INTEGRAL_GAIN,
+    Parameter::VELOCITY_LOOP_GAIN,
+    Parameter::VELOCITY_INTEGRAL_TIME,
+    Parameter::VELOCITY_FEED_FORWARD_GAIN,
 ];
 
 /// What else it has: from the configuration of the axis, and from what it sees in every cycle.

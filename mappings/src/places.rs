@@ -63,7 +63,7 @@ impl Mapping {
         });
         match missing {
             _ if OF_CONFIGURATION.contains(&parameter) => {
-                "has it from the nameplate in the configuration where the drive has none"
+                "has it from the configuration where the drive has none"
             }
             Some(Missing::Device | Missing::DeviceOrZero) => "goes by it where the drive has none",
             Some(Missing::Zero) => "takes 0 only where the drive has none",

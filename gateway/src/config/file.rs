@@ -327,6 +327,8 @@ pub struct AxisTable {
     pub converter: Option<ConverterTable>,
     /// Data of the motor's encoder that the drive does not show. Default: only what the drive shows.
     pub encoder: Option<EncoderTable>,
+    /// Data of the control loops that the drive does not show. Default: only what the drive shows.
+    pub loops: Option<LoopsTable>,
     /// How the captures of the drive are read: `cyclic`, `service-channel` or `off`. Default: `cyclic` on SERCOS, `service-channel` (SDO)
     /// on CAN.
     #[schemars(transform = form::word(&check::axis::EVENTS))]
@@ -481,6 +483,28 @@ pub struct EncoderTable {
     /// Length of an absolute linear encoder in mm.
     #[schemars(transform = form::positive)]
     pub length: Option<Spanned<f64>>,
+}
+
+/// `loops` of an `[[axis]]`: how the loops of its drive are set, in the units of CIP Volume 9, Tables 5-2.41 and 5-2.43. What the drive
+/// shows counts more.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoopsTable {
+    /// Proportional gain of the position loop, which is its bandwidth, in rad/s (attribute 441, Kpp).
+    #[schemars(transform = form::positive)]
+    pub position_gain: Option<Spanned<f64>>,
+    /// Integral gain of the position loop, one over its time constant, in rad/s; 0 for none (attribute 442, Kpi).
+    #[schemars(transform = form::not_negative)]
+    pub position_integral_gain: Option<Spanned<f64>>,
+    /// Proportional gain of the velocity loop, which is its bandwidth, in rad/s (attribute 461, Kvp).
+    #[schemars(transform = form::positive)]
+    pub velocity_gain: Option<Spanned<f64>>,
+    /// Integral gain of the velocity loop, one over its time constant, in rad/s; 0 for none (attribute 462, Kvi).
+    #[schemars(transform = form::not_negative)]
+    pub velocity_integral_gain: Option<Spanned<f64>>,
+    /// Part of the velocity set-point that the drive adds to the output of its position loop, in percent (attribute 440, Kvff).
+    #[schemars(transform = form::not_negative)]
+    pub velocity_feed_forward: Option<Spanned<f64>>,
 }
 
 impl LimitsTable {

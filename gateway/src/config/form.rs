@@ -120,6 +120,11 @@ pub fn positive(schema: &mut Schema) {
     schema.insert("exclusiveMinimum".to_owned(), Value::from(0));
 }
 
+/// A number that is not negative.
+pub fn not_negative(schema: &mut Schema) {
+    schema.insert("minimum".to_owned(), Value::from(0));
+}
+
 /// A table with a key at least.
 pub fn not_empty(schema: &mut Schema) {
     schema.insert("minProperties".to_owned(), Value::from(1));

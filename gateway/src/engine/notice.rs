@@ -35,6 +35,7 @@ use super::bus::devicenet::setup::SetupFailure;
 use super::bus::sercos::commissioning::StepFailure;
 use super::bus::startup::{StartupFailure, StartupReport};
 use super::device::scaling::ScalingRefusal;
+use super::direct::DirectFailure;
 use super::phase_lock::{LockState, Phase as LockPhase};
 use crate::mapping::{
     Cia402Error, Difference, DriveIdentity, InterpolationPeriod, Item, Number, Object, SercosError,
@@ -369,7 +370,33 @@ pub enum Notice {
         /// It is what the configuration has.
         configured: bool,
     },
-    /// The nameplate in the configuration says something else than the drive, which counts.
+    /// The drive has taken what the controller has set, and has something else afterwards.
+    NotKept {
+        /// Number of the axis.
+        axis: u8,
+        /// The attribute.
+        attribute: u16,
+        /// What the controller has set.
+        wanted: Option<Number>,
+        /// What the drive has.
+        held: Option<Number>,
+    },
+    /// The drive has refused what the controller would set, and says why.
+    DriveRefuses {
+        /// Number of the axis.
+        axis: u8,
+        /// The attribute.
+        attribute: u16,
+        /// What the controller wants.
+        wanted: Option<Number>,
+        /// What was to be written in the drive.
+        item: Item,
+        /// The drive has taken it, and refuses to show what it has now.
+        is_taken: bool,
+        /// What the drive says.
+        said: DirectFailure,
+    },
+    /// The data of the axis in the configuration say something else than the drive, which counts.
     OtherNameplate {
         /// Number of the axis.
         axis: u8,
@@ -495,6 +522,8 @@ impl Notice {
             | Self::DriveSays { axis, .. }
             | Self::Logged { axis, .. }
             | Self::NotEqual { axis, .. }
+            | Self::NotKept { axis, .. }
+            | Self::DriveRefuses { axis, .. }
             | Self::OtherNameplate { axis, .. }
             | Self::NotReturned { axis, .. }
             | Self::Scaling { axis, .. } => Some(*axis),
@@ -542,6 +571,8 @@ impl Notice {
             Self::Refused { .. }
             | Self::Strangers { .. }
             | Self::NotEqual { .. }
+            | Self::NotKept { .. }
+            | Self::DriveRefuses { .. }
             | Self::NotReturned { .. }
             | Self::Scaling { .. } => "refusal",
         }
@@ -695,9 +726,24 @@ impl fmt::Display for Notice {
             Self::NotEqual { attribute, .. } => {
                 write!(f, "attribute {attribute} is not what the drive has, and only the drive can change that")
             }
+            Self::NotKept { attribute, wanted: Some(wanted), held: Some(held), .. } => {
+                write!(f, "attribute {attribute} was set to {wanted}, and the drive has {held} afterwards")
+            }
+            Self::NotKept { attribute, .. } => {
+                write!(f, "attribute {attribute} was set, and the drive has something else afterwards")
+            }
+            Self::DriveRefuses { attribute, item, is_taken: true, said, .. } => {
+                write!(f, "attribute {attribute} was set, and cannot be read back: {item}: {said}")
+            }
+            Self::DriveRefuses { attribute, wanted: Some(wanted), item, said, .. } => {
+                write!(f, "attribute {attribute} is not set to {wanted}: {item}: {said}")
+            }
+            Self::DriveRefuses { attribute, item, said, .. } => {
+                write!(f, "attribute {attribute} is not set: {item}: {said}")
+            }
             Self::OtherNameplate { parameter, configured, held, .. } => {
                 let unit = parameter.row().map_or("", |row| row.quantity.unit());
-                write!(f, "{parameter}: the nameplate in the configuration has {configured} {unit}, the drive {held} {unit}, which counts")
+                write!(f, "{parameter}: the configuration has {configured} {unit}, the drive {held} {unit}, which counts")
             }
             Self::NotReturned { item, failure, .. } => {
                 let why = match failure {

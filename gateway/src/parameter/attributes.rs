@@ -1,11 +1,13 @@
-//! Attributes of drives on DeviceNet that are known before the drive is asked: those of the Identity object, and of a CIP Motion drive
-//! those of the Motion Device Axis Object that the dictionary has, with what overlays add to it.
+//! Attributes of drives on DeviceNet that are known before the drive is asked: those of the Identity object; of a CIP Motion drive those
+//! of the Motion Device Axis Object that the dictionary has, with what overlays add to it; of a velocity drive those of the AC/DC drive
+//! profile.
 //!
-//! The backup of a CIP Motion drive has the attributes that a Set service writes. Not in it are states and actual values (Get), control
-//! mode, data sets, commands and trims (Set*, which the connection writes), and outputs.
+//! The backup of a drive has the attributes that a Set service writes. Not in it are states and actual values (Get), control mode, data
+//! sets, commands and trims (Set*, which the connection writes), run, reset and references of a velocity drive, and outputs.
 
 use super::id::Id;
 use super::known::belongs_to_gateway;
+use super::speed_attributes;
 use super::value::Kind;
 use crate::config::DevicenetKind;
 use crate::mapping::devicenet::motion;
@@ -52,6 +54,19 @@ impl KnownAttribute {
         }
     }
 
+    /// One of a device profile, by class and number.
+    pub(super) fn of_profile(
+        (class, attribute): (u16, u16),
+        name: &str,
+        kind: Kind,
+        access: Access,
+        unit: &str,
+    ) -> Self {
+        let id = Id::Path { class, instance: INSTANCE, attribute };
+        let is_kept = access == Access::Set && belongs_to_gateway(id).is_none();
+        Self { id, name: name.to_owned(), kind, access, unit: unit.to_owned(), limits: [None; 2], is_kept }
+    }
+
     fn of_axis(row: &CipAttribute) -> Self {
         let id = Id::Path { class: motion::CLASS, instance: INSTANCE, attribute: row.id };
         let is_set = row.access == Access::Set && belongs_to_gateway(id).is_none();
@@ -90,12 +105,14 @@ pub fn attributes(kind: &DevicenetKind, mapping: &Mapping) -> Vec<KnownAttribute
         KnownAttribute::identity(6, "Serial Number", number(T::U32)),
         KnownAttribute::identity(7, "Product Name", Kind::ShortString),
     ];
-    let of_axis = match kind {
-        DevicenetKind::Motion { .. } => mapping.dictionaries.cip.attributes(),
-        // No table has the attributes of the AC/DC drive profile.
-        DevicenetKind::Speed { .. } => &[],
-    };
-    identity.into_iter().chain(of_axis.iter().map(KnownAttribute::of_axis)).collect()
+    let mut all: Vec<_> = identity.into();
+    match kind {
+        DevicenetKind::Motion { .. } => {
+            all.extend(mapping.dictionaries.cip.attributes().iter().map(KnownAttribute::of_axis));
+        }
+        DevicenetKind::Speed { .. } => all.extend(speed_attributes::all()),
+    }
+    all
 }
 
 fn kind(row: &CipAttribute) -> Kind {
@@ -164,7 +181,44 @@ mod tests {
         assert!(motion.iter().all(|known| known.kind != Kind::Unknown));
         let speed = DevicenetKind::Speed { assembly: Assembly(21), scale: 0 };
         let speed = attributes(&speed, &mapping);
-        assert!(speed.len() == 7 && speed.iter().all(|known| !known.is_kept), "{speed:?}");
+        let number = |known: &KnownAttribute| match known.id {
+            Id::Path { class, attribute, .. } => (class, attribute),
+            _ => panic!("{known:?}"),
+        };
+        assert!(speed.windows(2).all(|pair| number(&pair[0]) < number(&pair[1])), "in order, and once");
+        assert!(speed.iter().all(|known| known.kind != Kind::Unknown));
+    }
+
+    /// What a person sets is a parameter; what the connection carries, or the gateway sets for it, is not.
+    #[test]
+    fn parameters_of_a_velocity_drive_are_neither_its_states_nor_its_commands() {
+        let kind = DevicenetKind::Speed { assembly: Assembly(21), scale: 0 };
+        let speed = attributes(&kind, &Mapping::embedded().unwrap());
+        let known = |text: &str| {
+            let id = Id::parse(text).unwrap();
+            speed.iter().find(|known| known.id == id).unwrap_or_else(|| panic!("{text}"))
+        };
+        for (text, name, kind, unit) in [
+            ("40.1.6", "RatedCurrent", "u16", "100 mA"),
+            ("41.1.16", "DNFaultMode", "u8", ""),
+            ("42.1.18", "AccelTime", "u16", "ms / 2^TimeScale"),
+            ("42.1.21", "HighSpdLimit", "u16", "rpm / 2^SpeedScale"),
+            ("42.1.22", "SpeedScale", "i8", ""),
+        ] {
+            let known = known(text);
+            assert!(known.is_kept, "{text}");
+            assert_eq!((known.name.as_str(), known.kind.describe().as_str()), (name, kind), "{text}");
+            assert_eq!(known.unit, unit, "{text}");
+        }
+        // The vendor; run, control from the net, state, reset, a fault that is forced; source of the reference, actual value,
+        // references.
+        for text in [
+            "1.1.1", "41.1.3", "41.1.4", "41.1.5", "41.1.6", "41.1.12", "41.1.17", "42.1.4", "42.1.7",
+            "42.1.8", "42.1.12", "42.1.14",
+        ] {
+            assert!(!known(text).is_kept, "{text}");
+        }
+        assert_eq!(speed.iter().filter(|known| known.is_kept).count(), 28);
     }
 
     #[test]

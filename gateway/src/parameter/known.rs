@@ -200,6 +200,10 @@ pub fn belongs_to_gateway(id: Id) -> Option<&'static str> {
             (motion::CLASS, 89..=97) => Some(COMMUNICATION),
             // Control Mode, Feedback Mode, Event Checking Control; set-points; trims.
             (motion::CLASS, 40 | 42 | 60 | 360..=364 | 431 | 451 | 481 | 491) => Some(COMMAND),
+            // NetCtrl, NetRef.
+            (speed::CLASS_SUPERVISOR, 5) | (speed::CLASS_DRIVE, 4) => Some(COMMUNICATION),
+            // Run, fault reset, a forced fault; references.
+            (speed::CLASS_SUPERVISOR, 3 | 4 | 12 | 17) | (speed::CLASS_DRIVE, 8 | 12 | 14) => Some(COMMAND),
             _ => None,
         },
     }
@@ -268,6 +272,11 @@ mod tests {
             "0x42.1.97",
             "0x42.1.361",
             "0x42.1.451",
+            "0x29.1.3",
+            "0x29.1.5",
+            "0x29.1.12",
+            "0x2A.1.4",
+            "0x2A.1.8",
         ] {
             assert!(belongs_to_gateway(id(text)).is_some(), "{text}");
         }

@@ -6,5 +6,6 @@ pub mod backup;
 pub mod command;
 pub mod id;
 pub mod known;
+mod speed_attributes;
 pub mod startup;
 pub mod value;

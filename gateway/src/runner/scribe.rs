@@ -134,9 +134,10 @@ impl Scribe {
 const fn limited(notice: &Notice) -> Option<(LineKind, Peer)> {
     match notice {
         Notice::Refused { axis, .. } => Some((LineKind::Request, Peer::Axis(*axis))),
-        Notice::NotEqual { axis, .. } | Notice::Scaling { axis, .. } => {
-            Some((LineKind::Setting, Peer::Axis(*axis)))
-        }
+        Notice::NotEqual { axis, .. }
+        | Notice::NotKept { axis, .. }
+        | Notice::DriveRefuses { axis, .. }
+        | Notice::Scaling { axis, .. } => Some((LineKind::Setting, Peer::Axis(*axis))),
         _ => None,
     }
 }

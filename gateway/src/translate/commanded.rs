@@ -260,6 +260,8 @@ pub(super) fn push_notices(node: &mut Node, said: &[Notice], number: usize, axis
         | Notice::Refused { .. }
         | Notice::Logged { .. }
         | Notice::NotEqual { .. }
+        | Notice::NotKept { .. }
+        | Notice::DriveRefuses { .. }
         | Notice::OtherNameplate { .. }
         | Notice::NotReturned { .. }
         | Notice::Scaling { .. }

@@ -975,7 +975,7 @@ pub const FILES: &[File] = &[
         about: "Attributes of the Motion Device Axis Object that the protocol engine itself works with.",
         tables: "`mappings/tables/dictionary/cip-attributes.toml`",
         items: &[OfAttributes(Attributes {
-            class: "1 14 15 16 17 18 19 20 21 22 31 32 33 34 35",
+            class: "1 14 15 16 17 18 19 20 21 22 31 32 33 34 35 36",
             axis: "40 42 60 61 89 90 91 92 93 94 650 651 652 653 654 655 656 657 658 659 660 661 662 663 664 665 \
                    666 667 668 669 670 674 675 676 677",
             other_class: "2 3 4 5 6 7 28 29 30",

@@ -71,6 +71,8 @@ pub mod speed {
     pub const RUN: u8 = 1 << 0;
     /// Byte 0 to the drive: its fault is to be reset.
     pub const RESET: u8 = 1 << 1;
+    /// Motor Data object.
+    pub const CLASS_MOTOR: u16 = 0x28;
     /// Control Supervisor object.
     pub const CLASS_SUPERVISOR: u16 = 0x29;
     /// Its attribute FaultCode.

@@ -4,7 +4,9 @@ use profile_generic::ratio::{Ratio, Rounding};
 
 use super::*;
 use crate::check::texts;
-use crate::computed::{Computation, Control, Fact, Known, Limit, NoValue, Operand, Operation, Read, Row};
+use crate::computed::{
+    Computation, Control, Fact, Known, Limit, NoValue, Operand, Operation, READS_MAX, Read, Row,
+};
 use profile_generic::mode::OperatingMode;
 
 const EXAMPLE: &str = include_str!("../../../examples/overlays/computed.toml");
@@ -405,7 +407,8 @@ fn a_row_of_some_modes_is_0_in_others_and_unknown_while_the_drive_moves_by_itsel
 #[test]
 fn what_a_drive_lacks_is_told_from_what_is_silent_and_what_is_0_for_certain() {
     let mut made = row(Operation::Product(vec![A, B]), (1, 1), Rounding::Nearest);
-    let value = |made: &Computation, fact| made.value(&Known { facts: [fact; 24], ..Known::default() });
+    let value =
+        |made: &Computation, fact| made.value(&Known { facts: [fact; READS_MAX], ..Known::default() });
     assert_eq!(value(&made, Fact::Absent), Err(NoValue::Absent(0)));
     assert_eq!(value(&made, Fact::Silent), Err(NoValue::Silent(0)));
     // With a factor of 0 the others do not matter.

@@ -57,7 +57,7 @@ fn the_example_of_the_documentation_does_what_it_says() {
 
 #[test]
 fn an_attribute_that_is_served_is_rejected_no_more() {
-    let name = "Velocity Integrator Output";
+    let name = "Acceleration Reference";
     let id = shipped().dictionaries.cip.attribute(name).unwrap().id;
     assert!(shipped().cip.rejected.iter().any(|(known, _)| *known == id));
     let row = format!(

@@ -159,6 +159,8 @@ pub struct OpenParameters {
     pub t_to_o_dscp: u8,
     /// Format revision of the connection data (the I/O connection point of the path); 0 with assemblies.
     pub format_revision: u8,
+    /// Bits of the configuration block of the path (class attribute 36); 0 with assemblies.
+    pub configuration_bits: u8,
     /// A connection to assemblies in place of the motion connection.
     pub assembly: Option<AssemblyOpen>,
 }

@@ -22,6 +22,7 @@ attributes! {
         Class LATE_UPDATES = 33, Byte, Set, 0, "Late Controller Updates" ["# of Late Packets"];
         Class POWER_STRUCTURE_CLASS_ID = 34, Udint, Get, 0, "Drive Power Structure Class ID";
         Class STEP_THRESHOLD = 35, Udint, Set, 1000000, "Step Threshold" ["Nanoseconds"];
+        Class CONNECTION_CONFIGURATION_BITS = 36, Byte, Get, 0, "Connection Configuration Bits";
         Instance CONTROL_MODE = 40, Usint, Cyclic, 0, "Control Mode";
         Instance FEEDBACK_MODE = 42, Byte, Cyclic, 0, "Feedback Mode";
         Instance EVENT_CHECKING_CONTROL = 60, Dword, Cyclic, 0, "Event Checking Control";

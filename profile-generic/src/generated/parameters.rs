@@ -250,6 +250,10 @@ parameter_rows! {
         "Acceleration that the torque of the loops makes.";
     VELOCITY_LOOP_OUTPUT = 0x093A, "velocity_loop_output", BasicDrive, Acceleration, Integer, Read,
         "Output of the velocity loop without what is fed forward.";
+    VELOCITY_PROPORTIONAL_OUTPUT = 0x093B, "velocity_proportional_output", BasicDrive, Acceleration, Integer, Read,
+        "Output of the proportional part of the velocity loop.";
+    VELOCITY_INTEGRATOR_OUTPUT = 0x093C, "velocity_integrator_output", BasicDrive, Acceleration, Integer, Read,
+        "Output of the integrator of the velocity loop.";
 
     BUS_VOLTAGE = 0x0A01, "bus_voltage", BasicDrive, Voltage, Integer, Read,
         "Voltage of the DC bus.";

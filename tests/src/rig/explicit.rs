@@ -64,6 +64,22 @@ impl Client {
         self.request(rig, service, &path, data)
     }
 
+    /// Sets an attribute; `each` is called after each step until the answer is there. Returns the general status.
+    ///
+    /// # Panics
+    /// When there is no answer in time, or none that can be read.
+    pub fn set_while(
+        &self,
+        rig: &mut Rig,
+        (instance, attribute): (u8, u16),
+        value: &[u8],
+        each: impl FnMut(&mut Rig),
+    ) -> u8 {
+        let [low, high] = attribute.to_le_bytes();
+        let path = [0x20, 0x42, 0x24, instance, 0x31, 0, low, high];
+        self.request_while(rig, 0x10, &path, value, each).0
+    }
+
     /// The session.
     #[must_use]
     pub const fn handle(&self) -> u32 {
@@ -90,6 +106,17 @@ impl Client {
         path: &[u8],
         data: &[u8],
     ) -> (u8, u16, Vec<u8>) {
+        self.request_while(rig, service, path, data, |_| {})
+    }
+
+    fn request_while(
+        &self,
+        rig: &mut Rig,
+        service: u8,
+        path: &[u8],
+        data: &[u8],
+        each: impl FnMut(&mut Rig),
+    ) -> (u8, u16, Vec<u8>) {
         let request = Request { service: Service(service), path, data };
         let mut message = vec![0; request.buffer_len()];
         request.emit(&mut message).expect("it fits");
@@ -101,7 +128,7 @@ impl Client {
         let mut bytes = vec![0; body.buffer_len()];
         body.emit(&mut bytes).expect("it fits");
         let bytes = packet(Command::SEND_RR_DATA, self.handle, &bytes);
-        let answer = rig.exchange(self.slot, &bytes, millis(500));
+        let answer = rig.exchange_while(self.slot, &bytes, millis(500), each);
         let body = EncapsulatedPacket::parse(&answer[HEADER_LEN..]).expect("an answer");
         let reply = Reply::parse(body.packet.items[1].data).expect("a reply");
         (reply.status.0, reply.extended.first().copied().unwrap_or(0), reply.data.to_vec())

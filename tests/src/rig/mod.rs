@@ -951,6 +951,17 @@ impl Rig {
 
     /// Sends bytes on such a stream and returns what comes back within `limit`, all of it.
     pub fn exchange(&mut self, slot: SessionSlot, bytes: &[u8], limit: DurationNs) -> Vec<u8> {
+        self.exchange_while(slot, bytes, limit, |_| {})
+    }
+
+    /// The same; `each` is called after each step.
+    pub fn exchange_while(
+        &mut self,
+        slot: SessionSlot,
+        bytes: &[u8],
+        limit: DurationNs,
+        mut each: impl FnMut(&mut Self),
+    ) -> Vec<u8> {
         let mut rest = bytes;
         let mut answer = Vec::new();
         let mut buffer = [0; 4096];
@@ -960,6 +971,7 @@ impl Rig {
             rest = &rest[taken..];
             self.send_requests();
             self.step();
+            each(self);
             let length = self.adapter.poll_transmit(self.now, slot, &mut buffer);
             answer.extend_from_slice(&buffer[..length]);
             if length == 0 && !answer.is_empty() {

@@ -119,11 +119,7 @@ fn another_motor_than_the_configured_one_is_reported() {
     let mut plc = with(configuration);
     plc.run_for(200);
     let said = plc.rig.told();
-    assert_eq!(
-        said.matches("motor_rated_current: the nameplate in the configuration has 9900000 uA").count(),
-        1,
-        "{said}"
-    );
+    assert_eq!(said.matches("motor_rated_current: the configuration has 9900000 uA").count(), 1, "{said}");
 }
 
 /// Parameters of the drive are attributes of a vendor object: read by anybody, written by the owner alone.

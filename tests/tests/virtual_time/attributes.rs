@@ -9,9 +9,13 @@ use axisbridge::mapping::{Access, CipAttribute, CipType, Mapping, Served, SetKin
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{NANO, millis};
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
+use profile_cia402::node::dictionary::{DataType, Definition as Entry};
+use profile_cia402::wire::Mux;
 use profile_cip::controller::{AxisSet, Step};
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::motion::id_list::IdList;
+use profile_sercos::slave::parameter::Definition;
+use profile_sercos::wire::idn::Idn;
 
 const GET: u8 = 0x0E;
 const SET: u8 = 0x10;
@@ -308,6 +312,119 @@ fn what_only_the_drive_can_change_is_confirmed_or_refused_with_both_values_in_th
     let said = "attribute 1371 cannot be set to 10: the drive has 1, and only it can change that";
     assert!(told.contains(said), "{told}");
     assert_eq!(told.matches("attribute 1319 cannot be set to").count(), 2, "{told}");
+}
+
+/// 255 in an array of actions leaves that exception as it is, as controllers write it that change one of them. An array with a value that an
+/// exception cannot have changes none.
+#[test]
+fn an_action_of_255_leaves_an_exception_as_it_is() {
+    const ACTION: u16 = 672;
+    const ACTION_MFG: u16 = 673;
+    /// Motor Overspeed User Limit, which Axisbridge watches itself; Bus Undervoltage, for which the drive switches itself off.
+    const OVERSPEED: usize = 4;
+    const UNDERVOLTAGE: usize = 33;
+    let (mut rig, client) = rig_in(AxisState::Stopped);
+    let mut ask = |service, id, value: &[u8]| client.ask(&mut rig, service, 1, Some(id), value);
+    for id in [ACTION, ACTION_MFG] {
+        let (_, before) = ask(GET, id, &[]);
+        assert!(before.len() == 64 && before.iter().any(|action| *action != 255), "{id}: {before:?}");
+        assert_eq!(ask(SET, id, &[255; 64]).0, OK, "{id}");
+        assert_eq!(ask(GET, id, &[]), (OK, before), "{id}: nothing has changed");
+    }
+    let (_, before) = ask(GET, ACTION, &[]);
+    let mut actions = [255; 64];
+    actions[OVERSPEED] = 1;
+    assert_eq!(ask(SET, ACTION, &actions).0, OK);
+    let mut expected = before;
+    assert_ne!(expected[OVERSPEED], 1);
+    expected[OVERSPEED] = 1;
+    assert_eq!(ask(GET, ACTION, &[]), (OK, expected.clone()), "one of them");
+    (actions[OVERSPEED], actions[UNDERVOLTAGE]) = (2, 0);
+    assert_eq!(ask(SET, ACTION, &actions).0, INVALID_VALUE);
+    assert_eq!(ask(GET, ACTION, &[]), (OK, expected), "one bad member");
+}
+
+/// What the first drive has as its window of the position error.
+fn window(rig: &mut Rig) -> i64 {
+    match rig.can.first_mut() {
+        Some(wire) => wire.bus.nodes_mut().next().expect("a drive").dictionary().number(0x6065, 0),
+        None => rig.line.slaves()[0].store().number_of(Idn::standard(159)),
+    }
+}
+
+/// Sets it from inside, past the gateway.
+fn set_window(rig: &mut Rig, value: i64) {
+    match rig.can.first_mut() {
+        Some(wire) => {
+            wire.bus.nodes_mut().next().expect("a drive").dictionary_mut().set(0x6065, 0, value);
+        }
+        None => rig.line.slaves_mut()[0].store_mut().set_number_of(Idn::standard(159), value),
+    }
+}
+
+/// A set succeeds when the drive has the value afterwards, in whole steps of its unit, and not because it has taken it.
+#[test]
+fn a_drive_that_takes_a_value_and_keeps_another_is_found_out() {
+    const POSITION_ERROR_TOLERANCE: u16 = 444;
+    let canopen = Settings::without_line(include_str!("can.toml").to_owned());
+    for (bus, settings) in [("SERCOS", Settings::default()), ("CANopen", canopen)] {
+        let (mut rig, client) = super::settings::stopped(Rig::ready(settings));
+        // The drive makes something else of what it is given, once.
+        let set = |rig: &mut Rig, value: f32, becomes: &dyn Fn(i64) -> i64| {
+            let (before, mut is_done) = (window(rig), false);
+            client.set_while(rig, (1, POSITION_ERROR_TOLERANCE), &value.to_le_bytes(), |rig| {
+                let now = window(rig);
+                if now != before && !is_done {
+                    is_done = true;
+                    set_window(rig, becomes(now));
+                }
+            })
+        };
+        assert_eq!(set(&mut rig, 250_000.0, &|given| given), OK, "{bus}: it keeps it");
+        assert_eq!(set(&mut rig, 200_000.0, &|given| given / 2), INVALID_VALUE, "{bus}");
+        let (status, value) = client.ask(&mut rig, GET, 1, Some(POSITION_ERROR_TOLERANCE), &[]);
+        let held = f32::from_le_bytes(value.try_into().expect("a REAL"));
+        assert!(status == OK && (held - 100_000.0).abs() < 100.0, "{bus}: the drive has half of it, {held}");
+        let said = format!("attribute 444 was set to 200000, and the drive has {held} afterwards");
+        assert!(rig.told().contains(&said), "{bus}: {said} {}", rig.told());
+        // What differs by less than a thousandth is what a drive rounds.
+        assert_eq!(set(&mut rig, 300_000.0, &|given| given - 1), OK, "{bus}");
+    }
+}
+
+/// Narrows what the first drive takes, after it has said otherwise.
+fn narrow(rig: &mut Rig) {
+    if let Some(wire) = rig.can.first_mut() {
+        let dictionary = wire.bus.nodes_mut().next().expect("a drive").dictionary_mut();
+        let handle = dictionary.find(Mux::new(0x6065, 0)).expect("the object");
+        return dictionary.redefine(handle, Entry::new("Window", DataType::U32, 50).range(0, 100));
+    }
+    let window = Definition::value(Idn::standard(159), 0x0422_0001, "Monitoring window", 50).range(0, 100);
+    rig.line.slaves_mut()[0].store_mut().define(window);
+}
+
+/// The log has what the drive itself says of a value that it does not take.
+#[test]
+fn the_log_has_the_drives_own_words_of_a_refusal() {
+    const POSITION_ERROR_TOLERANCE: u16 = 444;
+    let canopen = Settings::without_line(include_str!("can.toml").to_owned());
+    for (bus, settings, said) in
+        [("SERCOS", Settings::default(), "S-0-0159: "), ("CANopen", canopen, "6065:00: ")]
+    {
+        let (mut rig, client) = super::settings::stopped(Rig::ready(settings));
+        narrow(&mut rig);
+        let (status, _) =
+            client.ask(&mut rig, SET, 1, Some(POSITION_ERROR_TOLERANCE), &123_000_f32.to_le_bytes());
+        assert_eq!(status, INVALID_VALUE, "{bus}");
+        let told = rig.told();
+        let line = told.lines().find(|line| line.contains("attribute 444 is not set to 123000: "));
+        let line = line.unwrap_or_else(|| panic!("{bus}: {told}"));
+        assert!(
+            line.contains(said)
+                && (line.contains("0x7007") || line.contains("0609 0031") || line.contains("06090031")),
+            "{bus}: {line}"
+        );
+    }
 }
 
 /// What Axisbridge does in one way only can be set to that way.

@@ -1,7 +1,7 @@
 //! Cyclic read lists: what an update carries is of its own instant, and what cannot be is refused when the list is made.
 
 use axisbridge_tests::rig::motion::{NANO, millis};
-use axisbridge_tests::rig::{Rig, Settings};
+use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::program::{CyclicAttribute, CyclicDirection};
 use profile_cip::controller::{AttributeSet, AxisSet, Limits, Step};
 
@@ -12,6 +12,9 @@ const POSITION_ERROR: u16 = 436;
 const POSITION_LOOP: u16 = 438;
 const KVFF: u16 = 440;
 const KPP: u16 = 441;
+const VELOCITY_INTEGRATOR: u16 = 456;
+const VELOCITY_LOOP: u16 = 457;
+const KJ: u16 = 496;
 const VELOCITY_REFERENCE: u16 = 453;
 const VELOCITY_FEEDBACK: u16 = 454;
 const VELOCITY_ERROR: u16 = 455;
@@ -95,6 +98,39 @@ fn what_the_loops_make_is_fresh_in_each_update() {
         let (error, output) = error.zip(output).expect("values");
         assert!((output - 25.0 * error / 1e6).abs() < 1e-6, "{bus}: {output} of {error}");
     }
+}
+
+/// While a drive gains speed its velocity is behind: what its loop gives is more than the gain makes of that, by the integrator.
+#[test]
+fn velocity_integrator_is_what_the_loop_gives_beyond_its_gain() {
+    let gains = "instance = 1\nloops = { velocity_gain = 300.0 }\n";
+    let configuration = BOX.replacen("instance = 1\n", gains, 1);
+    let ids = [VELOCITY_LOOP, VELOCITY_ERROR, VELOCITY_INTEGRATOR];
+    let mut rig = Rig::ready(Settings { configuration, ..Settings::default() });
+    rig.connect(vec![
+        Step::SetAttributes { axis: TURNTABLE, attributes: vec![AttributeSet::real(KJ, 0.5)] },
+        list(&ids),
+        Step::Enable(AxisSet::first(1)),
+        Step::Jog { axis: TURNTABLE, velocity: 4.0, acceleration: 20.0, jerk: 400.0, seconds: 2.0 },
+        Step::Dwell { seconds: 100.0 },
+    ]);
+    rig.run_until(millis(30_000), "motion", |rig| rig.velocity(0) > NANO / 2);
+    assert_eq!(rig.report().failure, None, "{}", rig.log());
+    let (mut updates, mut behind) = (0, 0.0_f64);
+    let (mut before, end) = (None, rig.now() + millis(250));
+    while rig.now() < end {
+        rig.step();
+        let values = ids.map(|id| value(&rig, id).unwrap_or_else(|| panic!("{id}: {}", rig.log())));
+        if before == Some(values) {
+            continue;
+        }
+        (before, updates) = (Some(values), updates + 1);
+        let [output, error, integrator] = values;
+        behind = behind.max(error.abs());
+        let expected = output - 300.0 * error;
+        assert!((integrator - expected).abs() < 0.01, "{integrator} of {output} and {error}: {expected}");
+    }
+    assert!(updates >= 30 && behind > 0.01, "{updates} updates, {behind} behind");
 }
 
 /// The drive shows its torque set-point and its bus voltage by its service channel only.

@@ -38,7 +38,7 @@ fn with(configuration: &str) -> Settings {
 }
 
 /// The box with a velocity drive of the AC/DC drive profile on the turntable.
-fn velocity_drive(assembly: u8) -> String {
+pub(super) fn velocity_drive(assembly: u8) -> String {
     let (head, tail) =
         BOX.split_once("[axis.limits]\nfollowing_error = 0.5\n").expect("the turntable's limits");
     let kind = format!("mac_id = 5\nkind = \"ac-dc\"\nassembly = {assembly}");

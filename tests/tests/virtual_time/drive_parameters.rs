@@ -3,25 +3,30 @@
 
 use std::collections::BTreeMap;
 
-use axisbridge::config::Config;
+use axisbridge::config::{Config, DevicenetKind};
 use axisbridge::engine::axis::Owner;
 use axisbridge::engine::direct::{DirectEnd, DirectNorth, DirectRequest};
 use axisbridge::engine::local::{ClientEnd, LocalNorth, Order, Request};
 use axisbridge::local::drive::job::{Context, Job, Step};
 use axisbridge::local::protocol;
 use axisbridge::parameter::known::Catalogue;
+use axisbridge::simulate::devicenet_drive::DevicenetNode;
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cia402::node::dictionary::{self, DataType};
 use profile_cia402::wire::Mux;
 use profile_cip::controller::{AxisSet, Limits, Step as Move};
+use profile_cip::devicenet::slave::speed_drive::objects::Settings as SpeedSettings;
+use profile_cip::devicenet::wire::speed::Assembly;
 use profile_generic::cast::f64_from_i64;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::DriveState;
 use profile_sercos::slave::parameter::Definition;
 use profile_sercos::wire::idn::Idn;
 
-use super::startup_lists::{real, replace_devicenet_drive};
+use super::beside::connect;
+use super::devicenet::velocity_drive;
+use super::startup_lists::{real, replace_devicenet_drive, replace_devicenet_drive_by};
 
 /// The axes of all configurations.
 const AXES: [&str; 2] = ["turntable", "slide"];
@@ -63,8 +68,7 @@ impl Bench {
         Self::new(rig, &configuration)
     }
 
-    fn devicenet() -> Self {
-        let configuration = include_str!("devicenet.toml");
+    fn devicenet(configuration: &str) -> Self {
         Self::new(Rig::new(Settings::without_line(configuration.to_owned())), configuration)
     }
 
@@ -74,7 +78,17 @@ impl Bench {
     }
 
     /// The reply to a line; `ahead` is called ahead of each access, with its number.
-    fn say_while(&mut self, line: &str, mut ahead: impl FnMut(&mut Rig, usize)) -> String {
+    fn say_while(&mut self, line: &str, ahead: impl FnMut(&mut Rig, usize)) -> String {
+        self.say_amid(line, ahead, |_| {})
+    }
+
+    /// The same; `amid` is called in each millisecond of an access.
+    fn say_amid(
+        &mut self,
+        line: &str,
+        mut ahead: impl FnMut(&mut Rig, usize),
+        mut amid: impl FnMut(&mut Rig),
+    ) -> String {
         let axes = AXES.map(str::to_owned);
         let request = protocol::parse(line, &axes, &[]).expect(line);
         let protocol::Request::Drive { axis, ask } = request else { panic!("{line}: {request:?}") };
@@ -105,6 +119,7 @@ impl Bench {
                     break answer;
                 }
                 self.rig.run_for(millis(1));
+                amid(&mut self.rig);
             };
             assert_eq!((answer.client, answer.id), (3, self.ids));
             step = job.take(answer, &context);
@@ -236,6 +251,45 @@ fn a_drive_that_accepts_a_value_and_does_not_keep_it_is_named_with_both() {
         }
     });
     assert_eq!(reply, "error write turntable not-kept: the drive took 6081:00 = 5 and has 4 afterwards\n");
+}
+
+/// A list that gets longer or shorter while its parts are read, and a number that changes between its value and its limits.
+#[test]
+fn a_parameter_that_changes_while_it_is_read_is_an_error_or_one_of_both_values() {
+    let mut bench = Bench::sercos(with_gain);
+    let all = bench.say("list turntable");
+    let count = all.lines().count();
+    assert!(all.contains("ok list turntable ") && count > 50, "{all}");
+    let store = bench.rig.line.slaves()[0].store();
+    let whole = store.get(store.find(Idn::standard(17)).expect("the list")).data().to_vec();
+    let mut cut = whole.clone();
+    cut.truncate(whole.len() - 12);
+    for (before, after) in [(&whole, &cut), (&cut, &whole)] {
+        bench.rig.line.slaves_mut()[0].store_mut().set_data_of(Idn::standard(17), before);
+        let mut passed = 0;
+        let reply = bench.say_amid(
+            "list turntable",
+            |_, _| {},
+            |rig| {
+                passed += 1;
+                if passed == 40 {
+                    rig.line.slaves_mut()[0].store_mut().set_data_of(Idn::standard(17), after);
+                }
+            },
+        );
+        assert!(passed > 40, "it was read for {passed} ms");
+        assert!(reply.starts_with("error list turntable refused: "), "{reply}");
+    }
+    assert_eq!(bench.say("list turntable"), all, "the next one is whole");
+    // Value, name, unit, minimum and maximum are read one after the other.
+    let gain: Idn = GAIN.parse().expect("an IDN");
+    let mut reads = 0;
+    let reply = bench.say_while("read turntable P-0-4000", |rig, number| {
+        reads = reads.max(number);
+        rig.line.slaves_mut()[0].store_mut().set_number_of(gain, if number == 0 { 350 } else { 349 });
+    });
+    assert!(reads >= 2 && reply.contains("\"value\":\"3.50\""), "the value that was read: {reply}");
+    assert_eq!(bench.object("read turntable P-0-4000")["value"], "3.49");
 }
 
 #[test]
@@ -438,7 +492,7 @@ fn backup(bench: &mut Bench) -> (BTreeMap<String, String>, usize) {
 /// A drive is backed up and lost. Another one in its place has other values; they are restored, seen in the drive, and the axis moves.
 #[test]
 fn a_devicenet_drive_is_backed_up_lost_replaced_restored_compared_and_moved() {
-    let mut bench = Bench::devicenet();
+    let mut bench = Bench::devicenet(include_str!("devicenet.toml"));
     for (id, value) in [("66.1.441", "75.5"), ("0x42.1.461", "300"), ("66.1.1315", "2")] {
         let object = bench.object(&format!("write turntable {id} {value}"));
         assert_eq!(object["value"], value, "{object}");
@@ -496,6 +550,94 @@ fn a_devicenet_drive_is_backed_up_lost_replaced_restored_compared_and_moved() {
     let encoder = "write turntable 66.1.1416 4096";
     let refused = "error write turntable value: 66.1.1416: the drive refuses it with status 0x09: ";
     assert!(bench.say(encoder).starts_with(refused), "{}", bench.say(encoder));
+}
+
+/// The settings of the first drive, an AC/DC drive.
+fn settings_of(rig: &Rig) -> SpeedSettings {
+    let Some(DevicenetNode::Speed(slave)) = rig.devicenet[0].bus.nodes().next() else {
+        panic!("a velocity drive")
+    };
+    *slave.application().settings()
+}
+
+/// The same of a drive of the AC/DC drive profile. It is slower to gain speed by what was restored.
+#[test]
+fn an_ac_drive_is_backed_up_lost_replaced_restored_compared_and_turned() {
+    let mut bench = Bench::devicenet(&velocity_drive(21));
+    let made = settings_of(&bench.rig);
+    for (id, value) in [
+        ("0x28.1.6", "48"),
+        ("0x28.1.15", "1450"),
+        ("42.1.18", "4000"),
+        ("42.1.20", "60"),
+        ("42.1.21", "1800"),
+        ("42.1.24", "3"),
+    ] {
+        let object = bench.object(&format!("write turntable {id} {value}"));
+        assert_eq!(object["value"], value, "{object}");
+    }
+    let object = bench.object("read turntable 42.1.18");
+    let told = ["name", "type", "unit", "access", "value"].map(|key| object[key].as_str().expect(key));
+    assert_eq!(told, ["AccelTime", "u16", "ms / 2^TimeScale", "Set", "4000"], "{object}");
+    let (kept, absent) = backup(&mut bench);
+    let ids: Vec<_> = kept.keys().map(String::as_str).collect();
+    let expected = [
+        "40.1.15", "40.1.3", "40.1.6", "40.1.7", "41.1.16", "42.1.18", "42.1.19", "42.1.20", "42.1.21",
+        "42.1.22", "42.1.24", "42.1.6",
+    ];
+    assert_eq!((ids.as_slice(), absent), (expected.as_slice(), 16));
+    // Commands and states are read and not kept, and nobody but the gateway commands.
+    for id in ["41.1.3", "41.1.5", "41.1.6", "42.1.4", "42.1.7", "42.1.8"] {
+        assert!(bench.say(&format!("read turntable {id} brief")).starts_with("ok"), "{id}");
+    }
+    for id in ["41.1.3", "41.1.12", "42.1.8"] {
+        let refused = format!(
+            "error write turntable gateway: {id} is not written: the gateway commands the drive with it\n"
+        );
+        assert_eq!(bench.say(&format!("write turntable {id} 1")), refused);
+    }
+    let before = settings_of(&bench.rig);
+
+    replace_devicenet_drive_by(&mut bench.rig, &DevicenetKind::Speed { assembly: Assembly(21), scale: 0 });
+    assert_eq!(settings_of(&bench.rig), made, "as it comes from its maker");
+    bench.rig.run_until(millis(20_000), "the new drive", |rig| rig.engine.axes()[0].south().is_some());
+    let (found, _) = backup(&mut bench);
+    let differ: Vec<_> = kept.iter().filter(|(id, data)| found[*id] != **data).collect();
+    let ids: Vec<_> = differ.iter().map(|(id, _)| id.as_str()).collect();
+    assert_eq!(ids, ["40.1.15", "40.1.6", "42.1.18", "42.1.20", "42.1.21", "42.1.24"]);
+    for (id, data) in differ {
+        let reply = bench.say(&format!("write turntable {id} hex:{data}"));
+        assert!(reply.starts_with("ok write turntable "), "{reply}");
+    }
+    assert_eq!(settings_of(&bench.rig), before, "{}", bench.rig.told());
+    assert_eq!(backup(&mut bench).0, kept);
+    // What the drive does not take is not kept.
+    let refused = "error write turntable value: 42.1.19: the drive refuses it with status 0x09: ";
+    assert!(bench.say("write turntable 42.1.19 0").starts_with(refused));
+
+    // 1800 rpm in 4 s: 7.5 revolutions a second for each second.
+    let turntable = AxisSet::one(1);
+    connect(
+        &mut bench.rig,
+        vec![
+            Move::FaultReset(turntable),
+            Move::Enable(turntable),
+            Move::RunAt { axis: 1, velocity: 15.0, acceleration: 1_000.0, jerk: 100_000.0 },
+            Move::Dwell { seconds: 4.0 },
+            Move::Disable(turntable),
+        ],
+    );
+    let speed = |rig: &Rig| rig.devicenet[0].bus.nodes().next().expect("a drive").actual().velocity.get();
+    bench.rig.run_until(millis(20_000), "a revolution a second", |rig| speed(rig) > 1_000_000_000);
+    bench.rig.run_for(millis(1_000));
+    let gained = f64_from_i64(speed(&bench.rig)) / 1e9;
+    assert!((gained - 8.5).abs() < 0.3, "{gained} {}", bench.rig.told());
+    // While it turns nothing is written.
+    let refused = bench.say("write turntable 42.1.18 500");
+    assert!(refused.starts_with("error write turntable "), "{refused}");
+    let report = bench.rig.run(millis(30_000));
+    assert!(report.failure.is_none(), "{:?} {}", report.failure, bench.rig.told());
+    assert_eq!(settings_of(&bench.rig), before, "after all that as well");
 }
 
 /// Turns of the motor of the first drive on DeviceNet.

@@ -4,7 +4,7 @@
 
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{NANO, millis};
-use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
+use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::program::{CyclicAttribute, CyclicDirection};
 use profile_cip::controller::{AttributeSet, AxisSet, Limits, Step};
 use profile_cip::wire::motion::codes::ControlMode;
@@ -37,6 +37,7 @@ mod id {
     pub const VELOCITY_INTEGRATOR: u16 = 456;
     pub const VELOCITY_LOOP: u16 = 457;
     pub const KAFF: u16 = 460;
+    pub const KVP: u16 = 461;
     pub const KJ: u16 = 496;
     pub const TORQUE_REFERENCE: u16 = 492;
     pub const TORQUE_REFERENCE_FILTERED: u16 = 493;
@@ -423,6 +424,82 @@ fn torque_and_power_of_a_canopen_drive_that_moves() {
     rig.run_for(millis(200));
     for id in TORQUES.into_iter().chain([id::IQ_FEEDBACK, id::OUTPUT_CURRENT, id::OUTPUT_POWER]) {
         near("without torque", get(&mut rig, &client, SLIDE, id), 0.0, 0.0);
+    }
+}
+
+/// The gains of the simulated drive: [`profile_generic::servo::ServoParameters`] and the feed-forward of its own object.
+const GAINS: &str = "loops = { position_gain = 50.0, velocity_gain = 400.0, velocity_integral_gain = 100.0, velocity_feed_forward = 40.0 }\n";
+
+/// A configuration whose first axis states these gains.
+fn with_gains(configuration: &str) -> String {
+    configuration.replacen("instance = 1\n", &format!("instance = 1\n{GAINS}"), 1)
+}
+
+/// The drive feeds 40 % of the velocity forward; its position loop makes the other 60 % of 2 turns a second of an error of 0.024 turns.
+#[test]
+fn loops_of_a_canopen_drive_are_computed_with_the_gains_of_the_configuration() {
+    let mut rig = Rig::new(settings(&with_gains(include_str!("can.toml"))));
+    let node = rig.can[0].bus.nodes_mut().next().expect("a device");
+    // Its own object, in thousandths.
+    node.dictionary_mut().set(0x2000, 0, 400);
+    rig.until_ready();
+    rig.connect(vec![
+        Step::Enable(AxisSet::first(1)),
+        turn(20.0, 2.0),
+        Step::Disable(AxisSet::first(1)),
+        Step::Dwell { seconds: 100.0 },
+    ]);
+    let client = Client::connect(&mut rig, CONTROLLER);
+    rig.run_until(millis(20_000), "2 turns a second", |rig| {
+        rig.engine.axes()[0].feedback().velocity.get() > 199 * NANO / 100
+    });
+    rig.run_for(millis(1_000));
+    let mut read = |id| get(&mut rig, &client, TURNTABLE, id);
+    near("Kvff", read(id::KVFF), 40.0, 0.0);
+    near("Kpp", read(id::KPP), 50.0, 0.0);
+    near("velocity feedforward command", read(id::VELOCITY_FEED_FORWARD), 0.8, 0.001);
+    near("position error", read(id::POSITION_ERROR), 24_000.0, 600.0);
+    near("position integrator output", read(id::POSITION_INTEGRATOR), 0.0, 0.0);
+    near("position loop output", read(id::POSITION_LOOP), 1.2, 0.03);
+    // What no object of the drive reports in position control comes out as what the drive does.
+    near("velocity reference", read(id::VELOCITY_REFERENCE), 2.0, 0.03);
+    near("velocity error", read(id::VELOCITY_ERROR), 0.0, 0.05);
+    to_step(&mut rig, 3);
+    rig.run_for(millis(100));
+    for id in LOOPS {
+        near("without torque", get(&mut rig, &client, TURNTABLE, id), 0.0, 0.0);
+    }
+}
+
+/// A drive that turns steadily against its friction has no velocity error: the integrator gives all of the output of the loop.
+#[test]
+fn velocity_integrator_of_a_drive_that_turns_steadily_gives_the_friction() {
+    let sercos = Settings { configuration: with_gains(BOX), ..Settings::default() };
+    for (bus, settings) in [("SERCOS", sercos), ("CANopen", settings(&with_gains(include_str!("can.toml"))))]
+    {
+        let (mut rig, client) = rig(
+            settings,
+            vec![
+                Step::Enable(AxisSet::first(1)),
+                Step::Jog { axis: TURNTABLE, velocity: 4.0, acceleration: 40.0, jerk: 800.0, seconds: 9.0 },
+                Step::Dwell { seconds: 100.0 },
+            ],
+        );
+        rig.run_until(millis(10_000), "4 turns a second", |rig| {
+            rig.engine.axes()[0].feedback().velocity.get() > 39 * NANO / 10
+        });
+        rig.run_for(millis(1_000));
+        let answer = get(&mut rig, &client, TURNTABLE, id::VELOCITY_INTEGRATOR);
+        assert_eq!(answer, Err(DEVICE_CONFLICT), "{bus}: without an inertia");
+        let (status, _) = client.ask(&mut rig, SET, TURNTABLE, Some(id::KJ), &0.5_f32.to_le_bytes());
+        assert_eq!(status, OK, "{bus}");
+        rig.run_for(millis(10));
+        let torque = if bus == "SERCOS" { idn(&rig, 84) } else { object(&mut rig, 0, 0x6074) } / 10.0;
+        assert!(torque > 1.0, "{bus}: friction: {torque} %");
+        let mut read = |id| get(&mut rig, &client, TURNTABLE, id);
+        near(bus, read(id::KVP), 400.0, 0.0);
+        near("velocity error", read(id::VELOCITY_ERROR), 0.0, 0.01);
+        near(bus, read(id::VELOCITY_INTEGRATOR), torque / 0.5, torque * 0.2 + 400.0 * 0.01);
     }
 }
 

@@ -60,15 +60,63 @@ fn data_of_the_configuration_are_read_and_compared() {
         // That is said once, and of nothing else.
         let held = (current * 1_000_000.0).round();
         let other = format!(
-            "motor_rated_current: the nameplate in the configuration has 9900000 uA, the drive {held} uA, which counts"
+            "motor_rated_current: the configuration has 9900000 uA, the drive {held} uA, which counts"
         );
         assert_eq!(rig.told().matches(&other).count(), 1, "{bus}: {}", rig.told());
-        let others = rig.told().matches("the nameplate in the configuration").count();
+        let others = rig.told().matches(", which counts").count();
         assert_eq!(
             others,
             if bus == "SERCOS" { 1 } else { 2 },
             "{bus}: the rated torque of a CANopen drive too"
         );
+    }
+}
+
+/// Gains that the drive does not show: an axis without them does not have the attributes. Of a SERCOS drive that shows its own, those
+/// count.
+#[test]
+fn gains_of_the_configuration_are_compared() {
+    const ALL: &str = "loops = { position_gain = 50.0, position_integral_gain = 2.5, velocity_gain = 400.0, velocity_integral_gain = 80.0, \
+                       velocity_feed_forward = 100.0 }\n";
+    let gains = [(440, 100.0_f32), (441, 50.0), (442, 2.5), (461, 400.0), (462, 80.0)];
+    let (mut bare, client) = rig(include_str!("can.toml"), "");
+    for (id, _) in gains {
+        let expected = if id == 442 { OK } else { NOT_SUPPORTED };
+        assert_eq!(client.ask(&mut bare, GET, 1, Some(id), &[]).0, expected, "{id}: nobody knows");
+    }
+    for (bus, configuration) in [
+        ("SERCOS", BOX),
+        ("CANopen", include_str!("can.toml")),
+        ("DeviceNet", include_str!("devicenet.toml")),
+    ] {
+        let (mut rig, client) = rig(configuration, ALL);
+        let shown = if bus == "SERCOS" { &[440, 441, 462][..] } else { &[] };
+        for (id, value) in gains.into_iter().filter(|(id, _)| !shown.contains(id)) {
+            let mut ask = |service, value: &[u8]| client.ask(&mut rig, service, 1, Some(id), value);
+            let held = (OK, value.to_le_bytes().to_vec());
+            assert_eq!(ask(GET, &[]), held, "{bus} {id}");
+            for (other, status) in
+                [(value, OK), (value * 1.0005, OK), (value * 1.1, INVALID_VALUE), (0.0, INVALID_VALUE)]
+            {
+                assert_eq!(ask(SET, &other.to_le_bytes()).0, status, "{bus} {id} {other}");
+            }
+            assert_eq!(ask(SET, &f32::NAN.to_le_bytes()).0, INVALID_VALUE, "{bus} {id}");
+            assert_eq!(ask(GET, &[]), held, "{bus} {id}: as it was");
+        }
+        let said = "attribute 461 cannot be set to 440: the configuration has 400";
+        assert!(rig.told().contains(said), "{bus}: {}", rig.told());
+        // S-0-0101 of this drive is 10 ms, which are 100 rad/s.
+        let other =
+            "velocity_integral_time: the configuration has 12500000 ns, the drive 10000000 ns, which counts";
+        let told = rig.told().matches(other).count();
+        assert_eq!(told, usize::from(bus == "SERCOS"), "{bus}: {}", rig.told());
+        for id in shown {
+            assert_eq!(client.ask(&mut rig, GET, 1, Some(*id), &[]).0, OK, "{bus} {id}");
+        }
+        if let Some(id) = shown.last() {
+            let (status, value) = client.ask(&mut rig, GET, 1, Some(*id), &[]);
+            assert_eq!((status, value), (OK, 100.0_f32.to_le_bytes().to_vec()), "{bus}: of the drive");
+        }
     }
 }
 

@@ -238,6 +238,50 @@ fn a_gear_that_was_agreed_turns_the_load_as_the_controller_believes() {
     assert_eq!(rig.report().failure, None, "{}", rig.told());
 }
 
+/// The same of a CANopen drive: its positions are those of the load (6092h), and 6063h is what its motor has turned.
+#[test]
+fn a_gear_of_a_canopen_drive_turns_the_load_as_the_controller_believes() {
+    let mut rig = Rig::new(settings(include_str!("can.toml")));
+    let dictionary = rig.can[0].bus.nodes_mut().next().expect("a drive").dictionary_mut();
+    dictionary.set(0x6091, 1, 10);
+    dictionary.set(0x6091, 2, 1);
+    rig.until_ready();
+    let positions = |rig: &Rig| {
+        let dictionary = rig.can[0].bus.nodes().next().expect("a drive").dictionary();
+        [0x6063, 0x6064].map(|index| dictionary.number(index, 0))
+    };
+    let (encoder, shaft) = {
+        let dictionary = rig.can[0].bus.nodes().next().expect("a drive").dictionary();
+        (dictionary.number(0x608F, 1) / dictionary.number(0x608F, 2), dictionary.number(0x6092, 1))
+    };
+    let limits = Limits { velocity: 1.0, acceleration: 10.0, jerk: 100.0 };
+    rig.connect(vec![
+        Step::SetAttributes {
+            axis: 1,
+            attributes: vec![
+                AttributeSet::usint(id::LOAD_TYPE, 2),
+                AttributeSet::bytes(id::GEAR_INPUT, &10_i32.to_le_bytes()),
+                AttributeSet::bytes(id::GEAR_OUTPUT, &1_i32.to_le_bytes()),
+            ],
+        },
+        Step::Enable(AxisSet::one(1)),
+        Step::MoveAbsolute { axis: 1, position: 1.0, limits },
+        Step::Dwell { seconds: 0.5 },
+        Step::MoveAbsolute { axis: 1, position: 2.0, limits },
+        Step::Dwell { seconds: 100.0 },
+    ]);
+    rig.run_until(millis(20_000), "the first turn", |rig| rig.report().steps_finished == 3);
+    rig.run_for(millis(300));
+    let first = positions(&rig);
+    rig.run_until(millis(20_000), "the second turn", |rig| rig.report().steps_finished == 5);
+    rig.run_for(millis(300));
+    let [motor, load] = positions(&rig);
+    let (motor, load) = (motor - first[0], load - first[1]);
+    assert_eq!(rig.report().failure, None, "{}", rig.told());
+    assert!((load - shaft).abs() < shaft / 500, "{load} of {shaft} in a turn of the load");
+    assert!((motor - 10 * encoder).abs() < encoder / 50, "{motor} of {encoder} in a turn of the motor");
+}
+
 /// A turntable on its way with these attributes set, and its fault after a while.
 fn watched(settings: Settings, attributes: Vec<AttributeSet>) -> Option<FaultCause> {
     let mut rig = Rig::ready(settings);

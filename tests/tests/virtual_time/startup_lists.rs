@@ -83,13 +83,17 @@ pub(super) fn real(rig: &Rig, id: u16) -> f32 {
 
 /// Takes the first drive off its network, and puts another one in its place, as it comes from its maker.
 pub(super) fn replace_devicenet_drive(rig: &mut Rig) {
+    replace_devicenet_drive_by(rig, &DevicenetKind::Motion { modes: Vec::new(), resolution: 1_048_576 });
+}
+
+/// The same by a drive of this kind.
+pub(super) fn replace_devicenet_drive_by(rig: &mut Rig, kind: &DevicenetKind) {
     let now = rig.now();
     rig.devicenet[0].bus.connect(now, 0, false);
     rig.run_for(millis(500));
     let now = rig.now();
     let mac = MacId::new(5).expect("a MAC ID");
-    let kind = DevicenetKind::Motion { modes: Vec::new(), resolution: 1_048_576 };
-    let mut drive = devicenet_drive::node(mac, DataRate::Rate500, &kind);
+    let mut drive = devicenet_drive::node(mac, DataRate::Rate500, kind);
     drive.start(now);
     *rig.devicenet[0].bus.nodes_mut().next().expect("a drive") = drive;
     rig.devicenet[0].bus.connect(now, 0, true);

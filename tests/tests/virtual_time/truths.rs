@@ -43,6 +43,14 @@ const NAMEPLATE: &str = "motor = { type = \"rotary-permanent-magnet\", rated_tor
                          thermal_time_constant = 60.0, bus = \"standalone\", mains = \"high\", checks_enable_input = true }\n\
                          encoder = { type = \"hiperface\", startup = \"absolute\", turns = 4096 }\n";
 
+/// Gains that no IDN or object of the drive shows, in the order of the buses.
+const LOOPS: [&str; 3] = [
+    "loops = { velocity_gain = 400.0 }\n",
+    "loops = { position_gain = 50.0, velocity_gain = 400.0, velocity_integral_gain = 100.0, \
+     velocity_feed_forward = 100.0 }\n",
+    "",
+];
+
 /// Cycle Resolution and Cycle Interpolation of both encoders.
 const COUNTS_OF_ENCODERS: [u16; 4] = [1416, 1417, 1466, 1467];
 
@@ -285,19 +293,25 @@ pub(super) fn truths(stage: &Stage) -> Vec<AttributeTruth<'_>> {
     stage.mapping.truths(&axis.attributes, &axis.south)
 }
 
+/// Gateways whose first axis has all that a configuration can say, in the order of the buses.
+fn full_drives() -> [Settings; 3] {
+    let with = |text: &str, bus: usize| {
+        let loops = LOOPS[bus];
+        text.replacen("instance = 1\n", &format!("instance = 1\n{NAMEPLATE}{loops}"), 1)
+    };
+    [
+        Settings { configuration: with(BOX, 0), ..Settings::default() },
+        Settings::without_line(with(include_str!("can.toml"), 1)),
+        Settings::without_line(with(include_str!("devicenet.toml"), 2)),
+    ]
+}
+
 #[test]
 fn attributes_are_what_the_table_of_truths_says() {
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
-    let with_nameplate =
-        |text: &str| text.replacen("instance = 1\n", &format!("instance = 1\n{NAMEPLATE}"), 1);
-    let settings = |text: &str| Settings::without_line(with_nameplate(text));
     let mut cells: BTreeMap<u16, Vec<String>> = BTreeMap::new();
     let mut counts = Vec::new();
-    for (bus, settings) in BUSES.into_iter().zip([
-        Settings { configuration: with_nameplate(BOX), ..Settings::default() },
-        settings(include_str!("can.toml")),
-        settings(include_str!("devicenet.toml")),
-    ]) {
+    for (bus, settings) in BUSES.into_iter().zip(full_drives()) {
         let stage = rehearse(&mapping, &settings);
         let truths = truths(&stage);
         let mut bench = Bench::start(bus, settings);
@@ -319,6 +333,62 @@ fn attributes_are_what_the_table_of_truths_says() {
         "{} is not what was measured (write it with {ACCEPT}=1): {differs:?}",
         path.display()
     );
+}
+
+/// The ids of the first cell of a row of the table of docs/mapping.md, `605, 640 to 642 of CiA 402`, and what is said of them.
+fn ids_of(cell: &str) -> (BTreeSet<u16>, &str) {
+    let ends = [" of ", " without "].into_iter().filter_map(|word| cell.find(word));
+    let end = ends.min().unwrap_or(cell.len());
+    let (ids, condition) = cell.split_at(end);
+    let number = |text: &str| text.trim().parse::<u16>().unwrap_or_else(|_| panic!("`{text}` of `{cell}`"));
+    let ids = ids.split(',').flat_map(|part| match part.split_once(" to ") {
+        Some((first, last)) => number(first)..=number(last),
+        None => number(part)..=number(part),
+    });
+    (ids.collect(), condition.trim())
+}
+
+/// What the configurations of the page, of full drives, do not give an axis has a reason in docs/mapping.md: all that position, velocity or
+/// torque control requires, and all that the tables have a row for. What stands there is not given.
+#[test]
+fn what_a_full_drive_does_not_have_stands_with_its_reason() {
+    let mapping = Mapping::embedded().expect("the shipped tables are sound");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/mapping.md");
+    let page = std::fs::read_to_string(path).expect("the page");
+    let table = page.split_once("| id | why not |\n|---|---|\n").expect("the table").1;
+    let rows = table.lines().take_while(|line| line.starts_with('|'));
+    let rows: Vec<_> =
+        rows.map(|line| ids_of(line.trim_matches('|').split('|').next().expect("a cell").trim())).collect();
+    assert!(rows.len() > 20, "{rows:?}");
+    let mut wrong = Vec::new();
+    for (bus, settings) in BUSES.into_iter().zip(full_drives()).take(2) {
+        let stage = rehearse(&mapping, &settings);
+        for row in truths(&stage) {
+            let known = mapping.dictionaries.cip.attribute_by_id(row.id).expect("of the dictionary");
+            // Nobody has a third encoder.
+            if known.channel.is_some_and(|channel| channel > 2) {
+                continue;
+            }
+            let is_there = !matches!(row.truth, Truth::Absent | Truth::Stored);
+            let applies = |condition: &str| match condition {
+                "" => true,
+                _ if condition.ends_with("]`") => false,
+                _ if BUSES.iter().any(|bus| condition.ends_with(bus)) => condition.ends_with(bus),
+                _ => condition.starts_with("of a rotary motor"),
+            };
+            let stands = rows.iter().any(|(ids, condition)| ids.contains(&row.id) && applies(condition));
+            let what = format!("{bus} {} {}: {} by {}", row.id, row.name, row.truth, row.by);
+            let is_required = known.need.chars().skip(3).any(|need| need == 'R');
+            let is_bound = !mapping.cip.rejected.iter().any(|(id, _)| *id == row.id);
+            if stands && is_there {
+                wrong.push(format!("{what}: docs/mapping.md says why not"));
+            }
+            if !stands && !is_there && (is_required || is_bound) {
+                wrong.push(format!("{what}: docs/mapping.md does not say why"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 /// The page of what was measured.

@@ -1,10 +1,10 @@
-//! `motor`, `converter` and `encoder` of an `[[axis]]`.
+//! `motor`, `converter`, `encoder` and `loops` of an `[[axis]]`.
 
 use profile_generic::parameter::Parameter;
-use profile_generic::ratio::Ratio;
+use profile_generic::ratio::{Ratio, Rounding, quotient};
 
 use super::{Problems, value};
-use crate::config::file::{AxisTable, ConverterTable, EncoderTable, MotorTable};
+use crate::config::file::{AxisTable, ConverterTable, EncoderTable, LoopsTable, MotorTable};
 use crate::config::{AxisKind, Nameplate};
 use crate::finding::Spanned;
 use crate::finding::registry as code;
@@ -94,14 +94,15 @@ impl Kind {
 
 pub(super) fn check(problems: &mut Problems, table: &AxisTable, unit: Option<AxisKind>) -> Option<Nameplate> {
     let (no_motor, no_converter) = (MotorTable::default(), ConverterTable::default());
-    let no_encoder = EncoderTable::default();
+    let (no_encoder, no_loops) = (EncoderTable::default(), LoopsTable::default());
     let motor = table.motor.as_ref().unwrap_or(&no_motor);
     let converter = table.converter.as_ref().unwrap_or(&no_converter);
     let encoder = table.encoder.as_ref().unwrap_or(&no_encoder);
+    let loops = table.loops.as_ref().unwrap_or(&no_loops);
     let before = problems.len();
     let kind = kind(problems, table, motor, unit);
     let mut data = Vec::new();
-    let rows = motor_rows(motor).into_iter().chain(converter_rows(converter));
+    let rows = motor_rows(motor).into_iter().chain(converter_rows(converter)).chain(loop_rows(loops));
     for (number, what, parameters, units) in rows {
         let at = usize::from(kind.is_linear);
         let (num, den) = units[at];
@@ -124,6 +125,7 @@ pub(super) fn check(problems: &mut Problems, table: &AxisTable, unit: Option<Axi
     let checks = converter.checks_enable_input.map(i64::from);
     data.extend(checks.map(|checks| (Parameter::ENABLE_INPUT_CHECKING, checks)));
     encoder_range(problems, encoder, kind, &mut data);
+    loop_terms(problems, loops, &mut data);
     if let Some(code) = kind.code {
         data.push((Parameter::MOTOR_TYPE, code));
         data.push((Parameter::MOTOR_UNIT, i64::from(kind.is_linear)));
@@ -194,6 +196,59 @@ fn converter_rows(converter: &ConverterTable) -> [Row<'_>; 5] {
         plain(&converter.thermal_time_constant, THERMAL, Parameter::DRIVE_THERMAL_TIME, BILLION),
         plain(&converter.rated_power, "the rated power", Parameter::DRIVE_RATED_POWER, MILLION),
     ]
+}
+
+/// Gains that each such loop has.
+fn loop_rows(loops: &LoopsTable) -> [Row<'_>; 2] {
+    [
+        plain(&loops.position_gain, "the gain of the position loop", Parameter::POSITION_LOOP_GAIN, MILLION),
+        plain(&loops.velocity_gain, "the gain of the velocity loop", Parameter::VELOCITY_LOOP_GAIN, MILLION),
+    ]
+}
+
+/// Terms that a loop need not have: they may be 0.
+fn loop_terms(problems: &mut Problems, loops: &LoopsTable, data: &mut Vec<(Parameter, i64)>) {
+    let terms = [
+        (
+            &loops.position_integral_gain,
+            "the integral gain of the position loop",
+            Parameter::POSITION_INTEGRAL_GAIN,
+            MILLION,
+        ),
+        (
+            &loops.velocity_feed_forward,
+            "the feedforward of the velocity",
+            Parameter::VELOCITY_FEED_FORWARD_GAIN,
+            (10_000, 1),
+        ),
+    ];
+    for (number, what, parameter, (num, den)) in terms {
+        let fine = value::not_negative(problems, number, what, Ratio::new(num, den));
+        data.extend(fine.flatten().map(|fine| (parameter, fine)));
+    }
+    let what = "the integral gain of the velocity loop";
+    let gain = &loops.velocity_integral_gain;
+    let Some(Some(nano)) = value::not_negative(problems, gain, what, value::NANO) else { return };
+    // The generic model has the time constant, which is one over the gain; 0 is none in both.
+    match integral_time(nano) {
+        Some(time) => data.push((Parameter::VELOCITY_INTEGRAL_TIME, time)),
+        None => {
+            let Some(gain) = gain else { return };
+            let title = format!("{what} is {}", gain.get_ref());
+            let expected = "expected a time constant, one over it, of at least 1 ns";
+            problems.report_as::<()>(code::OUT_OF_RANGE, gain.span(), title, expected);
+        }
+    }
+}
+
+/// Time constant in ns of an integral gain in 1e-9 rad/s. `None` for one below half a nanosecond.
+fn integral_time(gain: i64) -> Option<i64> {
+    const NANO_OF_NANO: i128 = 1_000_000_000_000_000_000;
+    if gain == 0 {
+        return Some(0);
+    }
+    let time = quotient(NANO_OF_NANO, gain.into(), Rounding::Nearest)?;
+    (time.value > 0).then_some(time.value)
 }
 
 /// What a motor of another kind has.
@@ -336,6 +391,21 @@ mod tests {
             ])),
             "a motor that turns a screw is none in millimetres"
         );
+        let loops = "loops = { position_gain = 50.0, position_integral_gain = 0.0, velocity_gain = 400.5, \
+                     velocity_integral_gain = 80.0, velocity_feed_forward = 99.5 }";
+        assert_eq!(
+            read("revolution", loops),
+            Ok(Nameplate(vec![
+                (Parameter::POSITION_LOOP_GAIN, 50_000_000),
+                (Parameter::POSITION_INTEGRAL_GAIN, 0),
+                (Parameter::VELOCITY_LOOP_GAIN, 400_500_000),
+                (Parameter::VELOCITY_INTEGRAL_TIME, 12_500_000),
+                (Parameter::VELOCITY_FEED_FORWARD_GAIN, 995_000),
+            ]))
+        );
+        let none = "loops = { velocity_integral_gain = 0.0 }";
+        let none = read("revolution", none);
+        assert_eq!(none, Ok(Nameplate(vec![(Parameter::VELOCITY_INTEGRAL_TIME, 0)])), "0 is none");
         assert_eq!(read("revolution", ""), Ok(Nameplate(Vec::new())));
     }
 
@@ -381,6 +451,29 @@ mod tests {
             ("revolution", "encoder = { type = \"ldt\" }", "unknown type of encoder `ldt`"),
             ("revolution", "converter = { mains = \"230\" }", "unknown kind of mains `230`"),
             ("revolution", "converter = { bus_voltage = 1e30 }", "the bus voltage"),
+            ("revolution", "loops = { position_gain = 0.0 }", "the gain of the position loop is 0"),
+            ("revolution", "loops = { velocity_gain = -1.0 }", "the gain of the velocity loop is -1"),
+            (
+                "revolution",
+                "loops = { position_integral_gain = -0.5 }",
+                "the integral gain of the position loop is -0.5",
+            ),
+            (
+                "revolution",
+                "loops = { velocity_feed_forward = -1.0 }",
+                "the feedforward of the velocity is -1",
+            ),
+            ("revolution", "loops = { velocity_feed_forward = nan }", "the feedforward of the velocity"),
+            (
+                "revolution",
+                "loops = { velocity_integral_gain = 1e-12 }",
+                "the integral gain of the velocity loop is 0.000000000001",
+            ),
+            (
+                "revolution",
+                "loops = { velocity_integral_gain = 3e9 }",
+                "the integral gain of the velocity loop is 3000000000",
+            ),
         ] {
             let error = read(unit, keys).expect_err(keys);
             assert!(error.iter().any(|error| error.contains(expected)), "{keys}: {error:?}");
@@ -396,6 +489,8 @@ mod tests {
         let magnets = "torque_constant = 1.0, voltage_constant = 1.0, q_inductance = 1.0, d_inductance = 1.0";
         let converter = "converter = { bus_voltage = 1.0, rated_current = 1.0, rated_voltage = 1.0, rated_power = 1.0, \
                          thermal_time_constant = 1.0, bus = \"standalone\", mains = \"high\", checks_enable_input = false }";
+        let loops = "loops = { position_gain = 1.0, position_integral_gain = 1.0, velocity_gain = 1.0, \
+                     velocity_integral_gain = 1.0, velocity_feed_forward = 1.0 }";
         let mut found = std::collections::BTreeSet::new();
         for (kind, keys, encoder) in [
             ("rotary-permanent-magnet", format!("{both}, {magnets}, poles = 8"), "turns = 4096"),
@@ -408,7 +503,7 @@ mod tests {
         ] {
             let keys = format!(
                 "motor = {{ type = \"{kind}\", {keys} }}\n{converter}\n\
-                 encoder = {{ type = \"resolver\", startup = \"absolute\", {encoder} }}"
+                 encoder = {{ type = \"resolver\", startup = \"absolute\", {encoder} }}\n{loops}"
             );
             found
                 .extend(read("millimetre", &keys).expect(kind).0.into_iter().map(|(parameter, _)| parameter));

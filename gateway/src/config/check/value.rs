@@ -155,6 +155,24 @@ pub(super) fn positive(
     })
 }
 
+/// An optional value of zero or above in fine units.
+pub(super) fn not_negative(
+    problems: &mut Problems,
+    value: &Option<Spanned<f64>>,
+    what: &str,
+    scale: Option<Ratio>,
+) -> Option<Option<i64>> {
+    optional(value, |value| {
+        let fine = fine(problems, value, what, scale)?;
+        // One that is rounded to zero would be none.
+        if *value.get_ref() == 0.0 || fine > 0 {
+            return Some(fine);
+        }
+        let title = format!("{what} is {}", value.get_ref());
+        problems.report_as(code::OUT_OF_RANGE, value.span(), title, "expected 0 or a number above it")
+    })
+}
+
 fn not_above_zero<T>(problems: &mut Problems, value: &Spanned<f64>, what: &str) -> Option<T> {
     let title = format!("{what} is {}", value.get_ref());
     problems.report_as(code::OUT_OF_RANGE, value.span(), title, "expected a number above 0")

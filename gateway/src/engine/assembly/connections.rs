@@ -367,6 +367,7 @@ mod tests {
             t_to_o_variable: false,
             t_to_o_dscp: 47,
             format_revision: 0,
+            configuration_bits: 0,
             assembly: Some(AssemblyOpen { role, t_to_o_rpi_us: 2 * RPI_US }),
         }
     }

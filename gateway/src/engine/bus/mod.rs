@@ -89,6 +89,8 @@ pub struct Answer {
     pub item: Item,
     /// The data read and the progress of a command, or why it failed.
     pub result: Result<(Data, Progress), AccessFailure>,
+    /// How the drive itself has said why it failed, as far as it has said anything.
+    pub said: Option<DirectFailure>,
 }
 
 impl Answer {

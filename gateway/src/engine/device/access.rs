@@ -14,9 +14,10 @@ use super::originals::Originals;
 use super::refusal::refusal;
 use super::scaling::signal_octets;
 use super::stopping_torque::{self, Comparison};
-use crate::engine::access::Access;
+use crate::engine::access::{Access, Operation};
 use crate::engine::axis::AxisChannel;
 use crate::engine::bus::{Answer, Buses, Purpose};
+use crate::engine::direct::DirectFailure;
 use crate::engine::notice::Notice;
 use crate::engine::parameter::{ParameterJob, ParameterJobs};
 use crate::mapping::{
@@ -30,9 +31,8 @@ const WRITES_MAX: usize = 8;
 /// The accesses of one axis that wait for its drive.
 #[derive(Debug, Default)]
 pub(super) struct Accesses {
-    /// Attributes of the sequences that are being written to the drive: ticket, attribute and bytes. What the drive has
-    /// taken is kept here as well, because the gateway goes by it.
-    writes: ArrayVec<(u32, u16, ArrayVec<u8, 8>), WRITES_MAX>,
+    /// What is being written to the drive, and read back.
+    writes: ArrayVec<Write, WRITES_MAX>,
     /// A Stopping Torque that is being compared with the drive's torque limits.
     comparison: Option<Comparison>,
     /// Values that are being compared with those of the drive: ticket and bytes.
@@ -43,6 +43,34 @@ pub(super) struct Accesses {
     originals: Originals,
     /// What the computed values of cyclic lists need.
     pub cyclic: CyclicValues,
+}
+
+/// How far a write is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum WriteStage {
+    /// The drive was asked to take it.
+    Written,
+    /// The drive has taken it, and is to be asked what it has now.
+    Taken,
+    /// It was asked.
+    ReadBack,
+}
+
+/// A value that is being written to the drive: a drive may take one and keep another.
+#[derive(Debug)]
+struct Write {
+    ticket: u32,
+    attribute: u16,
+    /// The value, as the controller has set it.
+    bytes: ArrayVec<u8, 8>,
+    /// The same, as the drive was sent it.
+    raw: ArrayVec<u8, 8>,
+    item: Item,
+    /// The drive lets it be read.
+    is_readable: bool,
+    /// Attribute of the sequences: what the drive has taken is kept in the device as well, because the gateway goes by it.
+    is_kept: bool,
+    stage: WriteStage,
 }
 
 /// An access to a computed value.
@@ -134,8 +162,28 @@ impl Accesses {
         if !self.originals.ask_before(&request, |before| buses.access(number, before, purpose)) {
             return Err(on.unasked());
         }
+        let written = match (&access.operation, &request.operation) {
+            (AccessOperation::Write(bytes), Operation::Write(raw)) => {
+                if self.writes.is_full() {
+                    return Err(GeneralStatus::RESOURCE_UNAVAILABLE);
+                }
+                let too_much = |_| GeneralStatus::TOO_MUCH_DATA;
+                let sequence = &mapping.cip.sequence;
+                Some(Write {
+                    ticket: access.ticket,
+                    attribute: access.id,
+                    bytes: ArrayVec::try_from(&bytes[..]).map_err(too_much)?,
+                    raw: ArrayVec::try_from(raw.as_slice()).map_err(too_much)?,
+                    item: held.item,
+                    is_readable: held.from_drive.is_some(),
+                    is_kept: is_of_sequence(access.id, sequence),
+                    stage: WriteStage::Written,
+                })
+            }
+            _ => None,
+        };
         on.ask(access, &request, write, buses)?;
-        self.note_write(access, &mapping.cip.sequence);
+        self.writes.extend(written);
         Ok(())
     }
 
@@ -185,6 +233,7 @@ impl Accesses {
         buses: &mut Buses,
         mapping: &Mapping,
     ) {
+        self.read_back(on, buses);
         let Accessed { number, axis_number, place, attributes, axis, .. } = *on;
         self.give_back(on, buses);
         let purpose = Purpose::Setting(on.number);
@@ -276,18 +325,62 @@ impl Accesses {
         Ok(())
     }
 
-    /// Remembers what is written to the drive for an attribute that the sequences go by.
-    fn note_write(&mut self, access: &AttributeAccess, sequence: &SequenceAttributes) {
-        if let AccessOperation::Write(bytes) = &access.operation
-            && [sequence.zero_speed, sequence.ramp_deceleration, sequence.deceleration_limit]
-                .contains(&access.id)
-            && let Ok(value) = ArrayVec::try_from(&bytes[..])
-        {
-            if self.writes.is_full() {
-                self.writes.remove(0);
+    /// Asks the drive for what it has made of the values that it has taken.
+    fn read_back(&mut self, on: &mut Accessed<'_>, buses: &mut Buses) {
+        for write in self.writes.iter_mut().filter(|write| write.stage == WriteStage::Taken) {
+            let (ticket, attribute) = (write.ticket, write.attribute);
+            let purpose = Purpose::Attribute { ticket, device: on.number, attribute, write: false };
+            if buses.access(on.axis_number, &Access::read(write.item), purpose) {
+                write.stage = WriteStage::ReadBack;
             }
-            self.writes.push((access.ticket, access.id, value));
         }
+        if on.is_gone() {
+            let device = &mut *on.device;
+            self.writes.retain(|write| {
+                let waits = write.stage == WriteStage::Taken;
+                if waits {
+                    device.complete_attribute(write.ticket, Err(GeneralStatus::DEVICE_STATE_CONFLICT));
+                }
+                !waits
+            });
+        }
+    }
+
+    /// Takes the drive's answer to a write, or to the question what it has made of it.
+    fn write_answered(
+        &mut self,
+        on: &mut Accessed<'_>,
+        answer: &Answer,
+        at: usize,
+        tables: &CipTables,
+        notice: &mut dyn FnMut(Notice),
+    ) {
+        if let Some(write) = self.writes.get_mut(at)
+            && write.stage == WriteStage::Written
+            && write.is_readable
+            && answer.result.is_ok()
+        {
+            write.stage = WriteStage::Taken;
+            return;
+        }
+        let write = self.writes.remove(at);
+        let outcome = match (&answer.result, write.stage) {
+            (Err(failure), _) => {
+                if let Some(said) = answer.said {
+                    notice(on.refused(&write, said));
+                }
+                Err(refusal(*failure))
+            }
+            (Ok((data, _)), WriteStage::ReadBack) if data.as_slice() != write.raw.as_slice() => {
+                on.kept(&write, data, tables, notice)
+            }
+            (Ok(_), _) => Ok(()),
+        };
+        if outcome.is_ok() && write.is_kept {
+            // It was checked against the type of the attribute when it was encoded.
+            let _ = on.device.put_attribute(on.place, write.attribute, &write.bytes);
+        }
+        on.device.complete_attribute(write.ticket, outcome.map(|()| &[][..]));
     }
 
     /// Takes the drive's answer to an access, and answers the controller.
@@ -302,12 +395,8 @@ impl Accesses {
         if write && answer.result.is_ok() {
             self.cyclic.written(answer.item, on.axis);
         }
-        if let Some(at) = self.writes.iter().position(|(of, ..)| *of == ticket) {
-            let (_, id, value) = self.writes.remove(at);
-            if answer.result.is_ok() {
-                // It was checked against the type of the attribute when it was encoded.
-                let _ = on.device.put_attribute(on.place, id, &value);
-            }
+        if let Some(at) = self.writes.iter().position(|write| write.ticket == ticket) {
+            return self.write_answered(on, answer, at, tables, notice);
         }
         if let Some(comparison) = self.comparison.as_mut().filter(|comparison| comparison.ticket == ticket) {
             if let Some(verdict) = comparison.take(answer, on.axis) {
@@ -392,6 +481,36 @@ impl Accessed<'_> {
             return Ok(0);
         }
         Err(self.not_equal(attribute, (entry.number(wanted), entry.number(held)), false, notice))
+    }
+
+    /// What the drive says of a value that it does not take.
+    fn refused(&self, write: &Write, said: DirectFailure) -> Notice {
+        let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
+        let wanted = self.attributes.get(write.attribute).and_then(|entry| entry.number(&write.bytes));
+        let (attribute, item, is_taken) = (write.attribute, write.item, write.stage == WriteStage::ReadBack);
+        Notice::DriveRefuses { axis, attribute, wanted, item, is_taken, said }
+    }
+
+    /// Whether the drive has kept a value, in whole steps of its unit.
+    fn kept(
+        &self,
+        write: &Write,
+        data: &[u8],
+        tables: &CipTables,
+        notice: &mut dyn FnMut(Notice),
+    ) -> Result<(), GeneralStatus> {
+        let attribute = write.attribute;
+        let mut bytes = [0; 8];
+        let len = self.read(attribute, data, tables, &mut bytes)?;
+        let entry = self.attributes.get(attribute).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)?;
+        let held = bytes.get(..len).unwrap_or_default();
+        if entry.agree(&write.bytes, held) {
+            return Ok(());
+        }
+        let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
+        let (wanted, held) = (entry.number(&write.bytes), entry.number(held));
+        notice(Notice::NotKept { axis, attribute, wanted, held });
+        Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)
     }
 
     /// The answer to a value that is not the one that the drive holds, or the configuration if it is `configured`; both go into the log.
@@ -574,6 +693,11 @@ fn shown(entry: Option<&AttributeEntry>, generic: i64, bytes: &mut [u8; 8]) -> R
         Ok((_, true)) => Err(GeneralStatus::DEVICE_STATE_CONFLICT),
         Err(_) => Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
     }
+}
+
+/// Whether the sequences go by an attribute.
+fn is_of_sequence(id: u16, sequence: &SequenceAttributes) -> bool {
+    [sequence.zero_speed, sequence.ramp_deceleration, sequence.deceleration_limit].contains(&id)
 }
 
 /// The value that the device holds of an attribute, in its generic unit.

@@ -184,7 +184,7 @@ impl Contacts {
         let what = match notice {
             Notice::State { .. } if runs => "",
             Notice::Refused { .. } => "axis control request",
-            Notice::NotEqual { .. } => "attribute",
+            Notice::NotEqual { .. } | Notice::NotKept { .. } | Notice::DriveRefuses { .. } => "attribute",
             Notice::Scaling { .. } => "scaling attributes",
             _ => return,
         };

@@ -152,6 +152,7 @@ impl Controller {
             t_to_o_variable: true,
             t_to_o_dscp: 0,
             format_revision: FORMAT_REVISION,
+            configuration_bits: 0,
             assembly: None,
         })
     }

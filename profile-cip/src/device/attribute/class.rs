@@ -26,7 +26,7 @@ pub(in crate::device) fn complete(
     if facts.sync_threshold.is_none() {
         class.retain(|row| !matches!(row.id, id::SYNC_VARIANCE | id::SYNC_THRESHOLD | id::SYNC_UPDATE_DELAY));
     }
-    let last = class.iter().map(|row| row.id).max().unwrap_or(0).max(id::STEP_THRESHOLD);
+    let last = class.iter().map(|row| row.id).max().unwrap_or(0).max(id::CONNECTION_CONFIGURATION_BITS);
     let axes = i64::try_from(facts.axes).unwrap_or(i64::MAX);
     for row in &mut class {
         match row.id {
@@ -114,7 +114,8 @@ mod tests {
         assert_eq!(value(id::NUMBER_OF_INSTANCES), [3, 0]);
         assert_eq!(value(id::OPTIONAL_ATTRIBUTE_LIST), [2, 0, 0xB9, 1, 0x84, 3], "441 and 900");
         assert_eq!(value(id::OPTIONAL_SERVICE_LIST), [1, 0, 0x1C, 0]);
-        assert_eq!(value(id::MAX_CLASS_ATTRIBUTE), [35, 0]);
+        assert_eq!(value(id::MAX_CLASS_ATTRIBUTE), [36, 0]);
+        assert_eq!(value(id::CONNECTION_CONFIGURATION_BITS), [0], "no connection");
         assert_eq!(value(id::MAX_INSTANCE_ATTRIBUTE), [0x84, 3]);
         assert_eq!(value(id::SYNC_VARIANCE), [0xFF; 4], "nothing is measured yet");
         assert_eq!(value(id::SYNC_THRESHOLD), 10_000_u32.to_le_bytes());

@@ -64,8 +64,9 @@ pub fn application_path(config: &MotionConfig) -> Vec<u8> {
 const CLASS_ID_MISMATCH: u16 = 0x04;
 const AXIS_ID_MISMATCH: u16 = 0x05;
 
-/// Checks the connection points and the configuration block. Returns the format revision of the connection data.
-pub(crate) fn check_path(path: &MotionPath<'_>, config: &MotionConfig) -> Result<u8, Refusal> {
+/// Checks the connection points and the configuration block. Returns the format revision of the connection data and the configuration
+/// bits.
+pub(crate) fn check_path(path: &MotionPath<'_>, config: &MotionConfig) -> Result<(u8, u8), Refusal> {
     let inconsistent = |found: u16, expected: u16| {
         Refusal::value(ConnectionStatus::INCONSISTENT_PATHS, u32::from(found), u32::from(expected))
     };
@@ -87,11 +88,12 @@ pub(crate) fn check_path(path: &MotionPath<'_>, config: &MotionConfig) -> Result
     if let Some(other) = io.iter().find(|other| **other != point) {
         return Err(inconsistent(*other, point));
     }
-    check_block(path.data.unwrap_or(&[]), revision, config)?;
-    Ok(format)
+    let bits = check_block(path.data.unwrap_or(&[]), revision, config)?;
+    Ok((format, bits))
 }
 
-fn check_block(block: &[u8], revision: u8, config: &MotionConfig) -> Result<(), Refusal> {
+/// Returns the configuration bits.
+fn check_block(block: &[u8], revision: u8, config: &MotionConfig) -> Result<u8, Refusal> {
     let found = u32::try_from(block.len()).unwrap_or(u32::MAX);
     let size = || Refusal::value(ConnectionStatus::INVALID_CONFIGURATION_SIZE, found, 8);
     let mut r = Reader::new(block);
@@ -110,7 +112,7 @@ fn check_block(block: &[u8], revision: u8, config: &MotionConfig) -> Result<(), 
         return Err(Refusal { found, expected, ..refusal });
     }
     if bits & VERIFY_POWER_RATINGS == 0 {
-        return Ok(());
+        return Ok(bits);
     }
     // In revision 2 a zero class ID leaves the check to the axis IDs, and a zero axis ID is not checked.
     let class_checked = revision == 1 || axis_ids.is_empty() || class_id != 0;
@@ -125,7 +127,7 @@ fn check_block(block: &[u8], revision: u8, config: &MotionConfig) -> Result<(), 
             return Err(power_mismatch(AXIS_ID_MISMATCH + n, id, expected));
         }
     }
-    Ok(())
+    Ok(bits)
 }
 
 fn power_mismatch(extended: u16, found: u32, expected: Option<u32>) -> Refusal {

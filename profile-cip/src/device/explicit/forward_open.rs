@@ -78,11 +78,11 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
         Application::Motion(path) => {
             node.check_controller(*origin.peer.ip())?;
             check_motion(node)?;
-            let format_revision = motion::check_path(&path, &node.config.motion)?;
+            let (format_revision, bits) = motion::check_path(&path, &node.config.motion)?;
             motion::check_parameters(open, &node.config.motion)?;
             node.connections.check_owner()?;
             node.check_reset()?;
-            open_io(node, origin, open, (format_revision, None))
+            open_io(node, origin, open, (format_revision, bits, None))
         }
         Application::Assembly(path) => {
             let assemblies = assemblies(node)?;
@@ -94,7 +94,7 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
             node.connections.check_assembly(role)?;
             node.check_reset()?;
             let assembly = AssemblyOpen { role, t_to_o_rpi_us: open.t_to_o_rpi_us };
-            open_io(node, origin, open, (0, Some(assembly)))
+            open_io(node, origin, open, (0, 0, Some(assembly)))
         }
     }
 }
@@ -147,7 +147,7 @@ fn open_io(
     node: &mut Node,
     origin: &Origin,
     open: &ForwardOpen<'_>,
-    (format_revision, assembly): (u8, Option<AssemblyOpen>),
+    (format_revision, configuration_bits, assembly): (u8, u8, Option<AssemblyOpen>),
 ) -> Result<Opened, Refusal> {
     // Point to point goes back to the peer itself, so of its socket address only the port counts. A group
     // address there is a mistake the originator has to hear of.
@@ -176,6 +176,7 @@ fn open_io(
         t_to_o_variable: open.t_to_o.variable,
         t_to_o_dscp: node.qos_in_use.of_priority(open.t_to_o.priority),
         format_revision,
+        configuration_bits,
         assembly,
     };
     node.ask(MotionRequest::Open(parameters)).map_err(|status| Refusal::new(status, 0))?;

@@ -207,6 +207,10 @@ impl Engine {
             (id::TIME_DATA_SET, header.map_or(0, |h| u64::from(h.time_data_set().bits()))),
             (id::LOST_UPDATES, u64::from(lost)),
             (id::LATE_UPDATES, u64::from(late)),
+            (
+                id::CONNECTION_CONFIGURATION_BITS,
+                self.connection.as_ref().map_or(0, |c| u64::from(c.parameters.configuration_bits)),
+            ),
             (id::POWER_STRUCTURE_CLASS_ID, u64::from(self.config.power_structure_class_id)),
         ]);
     }

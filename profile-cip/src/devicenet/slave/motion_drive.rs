@@ -377,6 +377,7 @@ impl MotionDrive {
             t_to_o_variable: false,
             t_to_o_dscp: 0,
             format_revision: FORMAT_REVISION,
+            configuration_bits: 0,
             assembly: None,
         };
         let reply = self.keeping(|drive| drive.request(now, MotionRequest::Open(parameters)));

@@ -432,7 +432,8 @@ impl CanBus {
             for drive in &mut device.drives {
                 if let Some((purpose, _)) = drive.accesses.take(ticket) {
                     let item = Item::object(outcome.object.index, outcome.object.sub);
-                    answer(axes, Answer { axis: drive.axis, purpose, item, result: reply(&outcome) });
+                    let said = outcome.result.err().map(DirectFailure::Sdo);
+                    answer(axes, Answer { axis: drive.axis, purpose, item, result: reply(&outcome), said });
                     return;
                 }
             }

@@ -291,7 +291,10 @@ impl DevicenetBus {
                 return;
             }
             if let Some((purpose, item)) = drive.accesses.take(ticket) {
-                answer(axes, Answer { axis, purpose, item, result: reply(item, purpose, outcome) });
+                let result = reply(item, purpose, outcome);
+                let said = result.as_ref().err().and_then(|_| access::refused_with(outcome));
+                let said = said.map(DirectFailure::Cip);
+                answer(axes, Answer { axis, purpose, item, result, said });
                 return;
             }
         }

@@ -578,7 +578,9 @@ impl SercosBus {
             self.commissioner.push(Job::Spent(outcome));
             return;
         };
-        answer(axes, Answer { axis: drive.axis, purpose, item: outcome.idn.into(), result: reply(&outcome) });
+        let (item, result) = (outcome.idn.into(), reply(&outcome));
+        let said = outcome.result.err().map(DirectFailure::Svc);
+        answer(axes, Answer { axis: drive.axis, purpose, item, result, said });
     }
 }
 

@@ -56,6 +56,8 @@ fn the_device_gets_what_was_asked_and_the_originator_what_was_given() {
             t_to_o_variable: true,
             t_to_o_dscp: 55,
             format_revision: 2,
+            // Verify power ratings.
+            configuration_bits: 1,
             assembly: None,
         }
     );
@@ -126,6 +128,10 @@ fn paths_that_lead_to_the_motion_connection() {
             ],
         ),
         (
+            "bits of later editions: networked safety",
+            &[&[0x20, 0x42, 0x2C, 0x51, 0x2C, 2, 0x80, 4], &[1, 6, 0, 0, 0, 0, 0, 0][..]].concat(),
+        ),
+        (
             "wrong IDs that are not to be verified",
             &[0x20, 0x42, 0x2C, 0x52, 0x2C, 2, 0x80, 6, 2, 0, 0, 0, 9, 9, 9, 9, 9, 0, 0, 0],
         ),
@@ -134,7 +140,10 @@ fn paths_that_lead_to_the_motion_connection() {
         let mut rig = Rig::new();
         let client = rig.client(1);
         rig.send_unconnected(client, &open_message(&ForwardOpen { path, ..motion_open(1) }));
-        assert!(matches!(rig.adapter.poll_motion(), Some(MotionRequest::Open(_))), "{name}");
+        let Some(MotionRequest::Open(open)) = rig.adapter.poll_motion() else { panic!("{name}") };
+        // Behind the length in words and the revision of the block.
+        let at = path.iter().rposition(|octet| *octet == 0x80).expect("a block") + 3;
+        assert_eq!(open.configuration_bits, path[at], "{name}");
     }
 }
 

@@ -248,6 +248,7 @@ impl Rig {
             t_to_o_variable: true,
             t_to_o_dscp: 55,
             format_revision: 2,
+            configuration_bits: 0,
             assembly: None,
         }
     }

@@ -712,9 +712,13 @@ fn variation_beyond_the_threshold_of_the_controller_is_an_alarm_while_synchronou
 #[test]
 fn updates_of_format_revision_3_run_or_are_idle() {
     let mut rig = Rig::new();
-    let parameters = OpenParameters { format_revision: 3, ..rig.open_parameters() };
+    let parameters =
+        OpenParameters { format_revision: 3, configuration_bits: 0b101, ..rig.open_parameters() };
     let reply = rig.request(MotionRequest::Open(parameters));
     assert_eq!(reply, Some(MotionReply::Opened { token: parameters.token, outcome: Ok(()) }));
+    // Connection Configuration Bits, of later editions too.
+    let bits = super::services::reply_of(rig.request(super::services::explicit(9, 0x0E, 0, Some(36), &[])));
+    assert_eq!(bits, (9, 0, vec![0b101]));
     rig.configure();
     // What the rig writes, as such a controller would.
     let send = |rig: &mut Rig, header: [u8; 4], revision: u8| -> NodeStatus {

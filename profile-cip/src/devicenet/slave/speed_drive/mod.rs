@@ -24,7 +24,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use self::objects::{
     AcDcDrive, Assemblies, CLASS_AC_DC_DRIVE, CLASS_ASSEMBLY, CLASS_CONTROL_SUPERVISOR, CLASS_MOTOR_DATA,
-    ControlSupervisor, MODE_TORQUE, MotorData, Settings,
+    ControlSupervisor, MODE_TORQUE, MotorData, MotorPlate, Settings,
 };
 use self::supervisor::{Inputs, next};
 use super::super::connection::{Change, Connection, ConnectionKind, ConnectionSetup, ConnectionState};
@@ -125,6 +125,11 @@ fn nano(units: i64, scale: i8) -> i64 {
     if scale < 0 { shift(nano, scale) } else { nano / shift(1, scale) }
 }
 
+/// What is set in a drive as it comes from its maker.
+fn settings(config: &SpeedDriveConfig) -> Settings {
+    Settings { motor: MotorPlate::of(&config.servo), ..Settings::default() }
+}
+
 impl SpeedDrive {
     /// A drive with power.
     ///
@@ -136,7 +141,7 @@ impl SpeedDrive {
         };
         let path = |assembly: Assembly| [0x20, 0x04, 0x24, assembly.0];
         Ok(Self {
-            settings: Settings::default(),
+            settings: settings(&config),
             servo: Servo::new(config.servo)?,
             actual: ServoActual::default(),
             power: true,
@@ -484,7 +489,7 @@ impl Application for SpeedDrive {
 
     /// Nothing outlives a reset.
     fn reset(&mut self, _: ResetKind) {
-        self.settings = Settings::default();
+        self.settings = settings(&self.config);
         self.command = SpeedCommand::default();
         self.network_fault = false;
         self.state = SupervisorState::STARTUP;

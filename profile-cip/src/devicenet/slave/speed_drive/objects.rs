@@ -1,6 +1,8 @@
 //! The objects of the AC/DC drive profile: Motor Data (28), Control Supervisor (29), AC/DC Drive (2A), and the assemblies
 //! (class 4).
 
+use profile_generic::servo::ServoParameters;
+
 use super::super::super::wire::speed::{Assembly, SpeedActual, SpeedCommand, SpeedStatus};
 use super::SpeedDrive;
 use crate::device::objects::object::Object;
@@ -39,6 +41,32 @@ pub struct Settings {
     pub speed_scale: i8,
     /// 2A:24 `TorqueScale`: a unit of torque is 2^-TorqueScale Nm. -7..=7.
     pub torque_scale: i8,
+    /// What the drive was given of its motor.
+    pub motor: MotorPlate,
+}
+
+/// Motor Data (28) that can be set. The simulated motor is what it is whatever they are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MotorPlate {
+    /// 28:6 `RatedCurrent`, 100 mA.
+    pub rated_current: u16,
+    /// 28:7 `RatedVoltage`, V.
+    pub rated_voltage: u16,
+    /// 28:15 `BaseSpeed`, rpm.
+    pub base_speed: u16,
+}
+
+impl MotorPlate {
+    /// That of the motor of a servo.
+    #[must_use]
+    pub fn of(servo: &ServoParameters) -> Self {
+        let word = |value: i64| u16::try_from(value.clamp(0, 65_535)).unwrap_or(0);
+        Self {
+            rated_current: word(servo.rated_current.0 / 100_000),
+            rated_voltage: word(servo.bus_voltage.0 / 1_000_000),
+            base_speed: word(servo.rated_velocity.0 / 1_000_000 * 60 / 1000),
+        }
+    }
 }
 
 /// `DriveMode`: closed-loop speed control.
@@ -58,6 +86,7 @@ impl Default for Settings {
             high_limit: 3000,
             speed_scale: 0,
             torque_scale: 0,
+            motor: MotorPlate::default(),
         }
     }
 }
@@ -91,7 +120,7 @@ impl<const INSTANCE: u16> Object for Assemblies<'_, INSTANCE> {
 }
 
 /// Motor Data.
-pub(super) struct MotorData<'a>(pub &'a SpeedDrive);
+pub(super) struct MotorData<'a>(pub &'a mut SpeedDrive);
 
 impl Object for MotorData<'_> {
     const REVISION: u16 = 1;
@@ -99,17 +128,36 @@ impl Object for MotorData<'_> {
     const ATTRIBUTE_MAX: u16 = 15;
 
     fn get(&self, attribute: u16, out: &mut Vec<u8>) -> Result<(), GeneralStatus> {
-        let servo = &self.0.config.servo;
-        let word = |value: i64| u16::try_from(value.clamp(0, 65_535)).unwrap_or(0).to_le_bytes();
+        let motor = &self.0.settings.motor;
         match attribute {
             3 => out.push(MOTOR_TYPE),
-            // 100 mA.
-            6 => out.extend(word(servo.rated_current.0 / 100_000)),
-            // V.
-            7 => out.extend(word(servo.bus_voltage.0 / 1_000_000)),
-            // rpm.
-            15 => out.extend(word(servo.rated_velocity.0 / 1_000_000 * 60 / 1000)),
+            6 => out.extend(motor.rated_current.to_le_bytes()),
+            7 => out.extend(motor.rated_voltage.to_le_bytes()),
+            15 => out.extend(motor.base_speed.to_le_bytes()),
             _ => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+        }
+        Ok(())
+    }
+
+    fn settable_len(&self, attribute: u16) -> Result<usize, GeneralStatus> {
+        match attribute {
+            3 => Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE),
+            6 | 7 | 15 => Ok(2),
+            _ => Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
+        }
+    }
+
+    fn set(&mut self, attribute: u16, value: &[u8]) -> Result<(), GeneralStatus> {
+        self.0.check_idle()?;
+        let value = match value {
+            [low, high] if (*low, *high) != (0, 0) => u16::from_le_bytes([*low, *high]),
+            _ => return Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE),
+        };
+        let motor = &mut self.0.settings.motor;
+        match attribute {
+            6 => motor.rated_current = value,
+            7 => motor.rated_voltage = value,
+            _ => motor.base_speed = value,
         }
         Ok(())
     }

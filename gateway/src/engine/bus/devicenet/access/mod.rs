@@ -125,6 +125,18 @@ fn accepted(outcome: &Outcome) -> Result<&[u8], AccessFailure> {
     }
 }
 
+/// The status with which a drive refuses, of the message or of the one attribute in its list; `None` if it has not said one.
+#[must_use]
+pub fn refused_with(outcome: &Outcome) -> Option<GeneralStatus> {
+    let status = match outcome {
+        Outcome::Refused { status, .. } => *status,
+        // Count, number, status and what belongs to it.
+        Outcome::Done(data) => GeneralStatus(*data.get(4)?),
+        Outcome::NoAnswer | Outcome::NotTaken(_) | Outcome::Malformed(_) | Outcome::Lost => return None,
+    };
+    (status != GeneralStatus::SUCCESS).then_some(status)
+}
+
 /// What a status is to those who do not know it; `None` of success.
 pub(in crate::engine) fn refusal(status: GeneralStatus) -> Option<Refusal> {
     Some(match status {

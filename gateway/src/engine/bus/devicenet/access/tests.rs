@@ -40,6 +40,11 @@ fn what_is_refused_or_makes_no_sense_is_told_apart() {
     let refusal = |refusal| Err(AccessFailure::Refused(refusal));
     assert_eq!(value(SCALE, &refused(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)), refusal(Refusal::Unknown));
     assert_eq!(written(LIMIT, &done(&[1, 0, 0xF8, 1, 9, 0])), refusal(Refusal::Value).map(|_: Data| ()));
+    let said = refused_with(&done(&[1, 0, 0xF8, 1, 9, 0]));
+    assert_eq!(said, Some(GeneralStatus::INVALID_ATTRIBUTE_VALUE), "the status of the drive itself");
+    let busy = GeneralStatus::DEVICE_STATE_CONFLICT;
+    assert_eq!(refused_with(&refused(busy)), Some(busy));
+    assert_eq!((refused_with(&Outcome::NoAnswer), refused_with(&done(&[1, 0]))), (None, None));
     let whole = [2, 0, 0x95, 2, 0, 0, 8, 0x96, 2, 0, 0, 3];
     for cut in 0..whole.len() - 1 {
         assert_eq!(value(AXIS_FAULT, &done(&whole[..cut])), Err(AccessFailure::Unanswered), "cut at {cut}");
