@@ -143,7 +143,9 @@ pub fn sdo_server(data: &[u8]) {
     assert_eq!(drain(&mut server, now), [[0x43, 0, 0x20, 1, 1, 2, 3, 4]]);
 }
 
-/// A client with a good server, whose answers are disturbed. Every request ends, and the next one without a disturbance goes well.
+/// A client with a good server, whose answers are disturbed. Every request ends, and the next one without a disturbance goes well, or
+/// the one after it: an answer that was changed to an abort leaves the server in its block, where a request is taken for a segment, until
+/// the client gives up and says so.
 pub fn sdo_client(data: &[u8]) {
     let mut bytes = Bytes::new(data);
     let head = bytes.byte();
@@ -164,8 +166,8 @@ pub fn sdo_client(data: &[u8]) {
     let mut answers = Disturber::new(data.get(2..).unwrap_or_default());
     rig.run(request.by(method), &mut answers);
     answers.calm();
-    let good = rig.run(SdoRequest::upload(NUMBER), &mut answers);
-    assert_eq!(good, Some(0x0403_0201));
+    let mut good = || rig.run(SdoRequest::upload(NUMBER), &mut answers);
+    assert_eq!(good().or_else(good), Some(0x0403_0201));
 }
 
 struct SdoPair {
