@@ -7,12 +7,10 @@ use std::fmt::Write as _;
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::path::PathBuf;
-use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::peer;
-use axisbridge_tests::process::Running;
 use axisbridge_tests::rig::network::Random;
 use profile_cip::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
 use profile_cip::wire::encapsulation::{Command, EncapsulationStatus, Packet};
@@ -22,8 +20,8 @@ use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, P
 use profile_cip::wire::status::Service;
 use profile_cip::wire::triad::ConnectionTriad;
 
-use super::flood::{CONTROLLER, GATEWAY, Network, STRANGER, numbers, run};
-use super::{in_namespace, one_bus, scratch, wait_for};
+use super::flood::{GATEWAY, Network, STRANGER, all_arrived, numbers, run};
+use super::{one_bus, wait_for};
 
 /// Set for the copy of this test binary that attacks: the name of the attack, and the milliseconds that it has.
 const ATTACK: &str = "AXISBRIDGE_TEST_ATTACK";
@@ -339,25 +337,11 @@ fn attacked(name: &str) {
     // The stranger answers nobody who asks for its Ethernet address.
     let mac = run(&network.stranger, "cat /sys/class/net/net0/address");
     run(&network.gateway, &format!("ip neigh replace {STRANGER} lladdr {mac} nud permanent dev net0"));
-    let log = scratch(&format!("{name}.log"));
-    let config = configuration(&format!("{name}.toml"));
-    let mut command = in_namespace(&network.gateway, &["run", "--config", config.to_str().expect("UTF-8")]);
-    command.env("NO_COLOR", "1").stderr(std::fs::File::create(&log).expect("the log can be written"));
-    let mut gateway = Running::start("run", &mut command);
-    wait_for(&log, "CP4", &mut gateway);
-
+    let (mut gateway, log) = network.start_gateway(name, &configuration(&format!("{name}.toml")));
     let attacks = u64::try_from(ATTACKS.len()).expect("few");
-    let seconds = attacks * (each.as_secs() + 1) + 8;
-    let mut command = in_namespace(
-        &network.controller,
-        &["simulate", "controller", "--target", GATEWAY, "--bind", CONTROLLER, "--axes", "2"],
-    );
-    command
-        .args(["--counts-per-unit", "1000000,10000", "--speed", "2,40", "--json"])
-        .args(["--update-period-us", "16000", "--seconds", &seconds.to_string()])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::inherit());
-    let controller = command.spawn().expect("the controller can be started");
+    // Each is between two looks at the counters.
+    let controller = network
+        .start_controller(attacks * (u64::try_from(each.as_millis()).expect("short") + 400) / 1_000 + 5);
     wait_for(&log, "-> Running", &mut gateway);
     let text = || std::fs::read_to_string(&log).expect("a log");
     let (first, began) = (memory(gateway.id()), Instant::now());
@@ -385,14 +369,7 @@ fn attacked(name: &str) {
     println!("{table}\nmemory +{grown} kB, {noise} lines in {seconds} s");
     let output = controller.wait_with_output().expect("the controller ends");
     let text = text();
-    assert!(output.status.success(), "the controller ended with {}\n{table}{text}", output.status);
-    let result: serde_json::Value =
-        serde_json::from_slice(&output.stdout).expect("--json prints one JSON object");
-    for axis in result["axes"].as_array().expect("an array `axes`") {
-        let number = |key: &str| axis[key].as_f64().expect("a number");
-        assert!((number("target") - number("reached")).abs() < 0.01, "{table}{axis}");
-        assert!(number("lost_updates") < 0.5, "{table}{axis}");
-    }
+    all_arrived(&output, &format!("{table}\n{text}"));
     assert_eq!(lost_before, 0, "{table}\n{text}");
     assert!(grown < GROWTH_MAX_KB, "{grown} kB\n{table}");
     assert!(noise < 100 + 100 * (seconds / 60 + 1), "{noise} lines\n{text}");

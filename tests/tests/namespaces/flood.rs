@@ -10,8 +10,8 @@
 
 use std::fmt::Write as _;
 use std::net::UdpSocket;
-use std::path::PathBuf;
-use std::process::Stdio;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use axisbridge_tests::host::in_real_time;
@@ -128,6 +128,30 @@ impl Network {
         command
     }
 
+    /// Starts the gateway, whose log comes in a file, and waits until its bus is up.
+    pub(super) fn start_gateway(&self, name: &str, config: &Path) -> (Running, PathBuf) {
+        let log = scratch(&format!("{name}.log"));
+        let mut command = in_namespace(&self.gateway, &["run", "--config", config.to_str().expect("UTF-8")]);
+        command.env("NO_COLOR", "1").stderr(std::fs::File::create(&log).expect("the log can be written"));
+        let mut gateway = Running::start("run", &mut command);
+        wait_for(&log, "CP4", &mut gateway);
+        (gateway, log)
+    }
+
+    /// Starts a controller that moves both axes for so long, and then prints how it went.
+    pub(super) fn start_controller(&self, seconds: u64) -> Child {
+        let words = ["simulate", "controller", "--target", GATEWAY, "--bind", CONTROLLER, "--axes", "2"];
+        let mut command = in_namespace(&self.controller, &words);
+        command.args(["--counts-per-unit", "1000000,10000", "--speed", "2,40", "--json"]);
+        // A host that is shared by other tests pauses for more than a short period now and then.
+        command.args(["--update-period-us", "16000", "--seconds", &seconds.to_string()]);
+        command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::inherit())
+            .spawn()
+            .expect("the controller can be started")
+    }
+
     /// Floods with these kinds to the end, and returns how many datagrams were sent.
     fn flood(&self, kinds: &[Kind]) -> u64 {
         let kinds = kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(" ");
@@ -194,12 +218,7 @@ fn a_flood_of_a_stranger_costs_moving_axes_nothing() {
 
 fn flooded(name: &str) {
     let network = Network::new();
-    let log = scratch(&format!("{name}.log"));
-    let config = configuration(&format!("{name}.toml"));
-    let mut command = in_namespace(&network.gateway, &["run", "--config", config.to_str().expect("UTF-8")]);
-    command.env("NO_COLOR", "1").stderr(std::fs::File::create(&log).expect("the log can be written"));
-    let mut gateway = Running::start("run", &mut command);
-    wait_for(&log, "CP4", &mut gateway);
+    let (mut gateway, log) = network.start_gateway(name, &configuration(&format!("{name}.toml")));
 
     // With no connection open the port takes nothing.
     let sent = network.flood(&[Kind::Garbage]);
@@ -209,18 +228,7 @@ fn flooded(name: &str) {
         "{refused} of {sent} datagrams reached the cycle while no connection was open"
     );
 
-    let seconds = FLOOD_TIME.as_secs() * 3 + 5;
-    let mut command = in_namespace(
-        &network.controller,
-        &["simulate", "controller", "--target", GATEWAY, "--bind", CONTROLLER, "--axes", "2"],
-    );
-    command
-        .args(["--counts-per-unit", "1000000,10000", "--speed", "2,40", "--json"])
-        // A host that is shared by other tests pauses for more than a short period now and then.
-        .args(["--update-period-us", "16000", "--seconds", &seconds.to_string()])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::inherit());
-    let controller = command.spawn().expect("the controller can be started");
+    let controller = network.start_controller(FLOOD_TIME.as_secs() * 3 + 5);
     wait_for(&log, "-> Running", &mut gateway);
     let [_, before] = network.counted();
     let lines = |log: &PathBuf| std::fs::read_to_string(log).expect("a log").lines().count();
@@ -237,14 +245,7 @@ fn flooded(name: &str) {
         after - before
     );
     println!("{said}");
-    assert!(output.status.success(), "the controller ended with {}: {said}\n{text}", output.status);
-    let result: serde_json::Value =
-        serde_json::from_slice(&output.stdout).expect("--json prints one JSON object");
-    for axis in result["axes"].as_array().expect("an array `axes`") {
-        let number = |key: &str| axis[key].as_f64().expect("a number");
-        assert!((number("target") - number("reached")).abs() < 0.01, "{said}: {axis}");
-        assert!(number("lost_updates") < 0.5, "{said}: {axis}");
-    }
+    all_arrived(&output, &format!("{said}\n{text}"));
     assert_eq!(lost, 0, "{said}\n{text}");
     assert!(sent > 3 * RATE, "that was no flood: {said}");
     assert!(after - before <= few(sent), "the kernel drops what is not the owner's: {said}\n{text}");
@@ -254,6 +255,18 @@ fn flooded(name: &str) {
     assert!((1..=2).contains(&about("dropped before they reached the cycle")), "{said}\n{text}");
     assert!(about("the last one from") <= 2, "{said}\n{text}");
     assert_eq!(gateway.terminate(Duration::from_secs(10)).code(), Some(0));
+}
+
+/// Each axis of a controller that has ended is where it was sent, and no update was lost.
+pub(super) fn all_arrived(controller: &Output, said: &str) {
+    assert!(controller.status.success(), "the controller ended with {}: {said}", controller.status);
+    let result: serde_json::Value =
+        serde_json::from_slice(&controller.stdout).expect("--json prints one JSON object");
+    for axis in result["axes"].as_array().expect("an array `axes`") {
+        let number = |key: &str| axis[key].as_f64().expect("a number");
+        assert!((number("target") - number("reached")).abs() < 0.01, "{said}: {axis}");
+        assert!(number("lost_updates") < 0.5, "{said}: {axis}");
+    }
 }
 
 /// What may pass the filter of so many datagrams: one in 4096, chosen at random, and three times that.

@@ -19,7 +19,7 @@ use serde_json::Value;
 use super::attackers::{answer_of, message};
 use super::{in_namespace, one_bus, scratch, wait_for};
 
-/// How often the gateway is killed, where it is not to be eight times.
+/// How often the gateway is killed, where it is not to be five times.
 const KILLS: &str = "AXISBRIDGE_KILLS";
 
 /// Set for the copy of this test binary that reads the inactivity time-out of the device, and sets it.
@@ -149,7 +149,7 @@ fn no_kill_of_the_gateway_lets_an_axis_move_or_damages_what_is_kept() {
 }
 
 fn killed() {
-    let kills = std::env::var(KILLS).ok().and_then(|text| text.parse().ok()).unwrap_or(8);
+    let kills = std::env::var(KILLS).ok().and_then(|text| text.parse().ok()).unwrap_or(5);
     let (host, line) = (Namespace::new("box"), Namespace::new("drv"));
     cable((&host, "sercos0", None), (&line, "sercos0", None));
     let seconds = (kills * 15 + 60).to_string();

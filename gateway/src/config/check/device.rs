@@ -28,7 +28,15 @@ pub(super) fn check(problems: &mut Problems, table: &DeviceTable, cycle_time: Du
     let name = value::name(problems, "device", &table.name);
     let listen = value::own_address(problems, &table.listen);
     let controllers = hosts::check(problems, table.controllers.as_ref(), "controllers", true);
-    let tools = hosts::check(problems, table.tools.as_ref(), "tools", true);
+    let tools = match (&table.tools, &table.controllers) {
+        (Some(tools), None) => problems.report_as(
+            code::CONTRADICTION,
+            tools.span(),
+            "`tools` without `controllers`: the tools could own the device, and nobody else",
+            "expected `controllers` as well",
+        ),
+        (tools, _) => hosts::check(problems, tools.as_ref(), "tools", true),
+    };
     let identity = identity(problems, &table.identity);
     let power_structure_class_id = value::number_or(
         problems,
@@ -174,6 +182,8 @@ fn connection_format(problems: &mut Problems, table: &DeviceTable) -> Option<For
 
 #[cfg(test)]
 mod tests {
+    use std::net::Ipv4Addr;
+
     use super::super::checked;
     use super::*;
 
@@ -199,6 +209,20 @@ mod tests {
             let found = device("", &format!("revision = \"{bad}\""), DurationNs::ZERO);
             assert_eq!(found, Err(vec![format!("`{bad}` is not a revision")]));
         }
+    }
+
+    #[test]
+    fn tools_are_those_beside_the_controllers() {
+        let both = "controllers = [\"192.0.2.7\"]\ntools = []";
+        let found = device(both, "", DurationNs::ZERO).unwrap();
+        let host = |last: u8| Ipv4Addr::new(192, 0, 2, last);
+        assert!(found.controllers.has_v4(host(7)) && !found.controllers.has_v4(host(8)));
+        assert!(!found.tools.has_v4(host(8)));
+        let open = device("controllers = [\"192.0.2.7\"]", "", DurationNs::ZERO).unwrap();
+        assert!(open.tools.has_v4(host(8)), "everybody may read");
+        let alone = device("tools = [\"192.0.2.7\"]", "", DurationNs::ZERO);
+        let title = "`tools` without `controllers`: the tools could own the device, and nobody else";
+        assert_eq!(alone, Err(vec![title.to_owned()]));
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub use self::connection::Places;
 use self::reader::{Keys, Problems};
 use self::step::Frame;
 use crate::config::FILE_LEN_MAX;
-use crate::finding::{Findings, Source, read_file, tree};
+use crate::finding::{Findings, read_file};
 use crate::mapping::{CipDictionary, Mapping};
 
 /// A script that has been read and checked.
@@ -74,17 +74,7 @@ impl Script {
     /// # Errors
     /// Every fault found.
     pub fn parse(source: &str, name: &str, mapping: &Mapping) -> Result<Self, Findings> {
-        let mut findings = Findings::default();
-        let text = Source::new(name, source);
-        let problems = Problems::default();
-        // What stands behind a fault of the syntax may be read wrongly.
-        let script = tree(source, &text, &mut findings)
-            .and_then(|table| read(table.get_ref(), source, mapping, &problems));
-        problems.take().into_iter().for_each(|problem| findings.push(&text, problem));
-        match script {
-            Some(script) if findings.is_empty() => Ok(script),
-            _ => Err(findings),
-        }
+        reader::parsed(source, name, |table, problems| read(table, source, mapping, problems))
     }
 }
 
@@ -94,13 +84,7 @@ const UNEXPECTED_FAULTS: &[(&str, bool)] = &[("fail", true), ("ignore", false)];
 fn read(table: &DeTable<'_>, source: &str, mapping: &Mapping, problems: &Problems) -> Option<Script> {
     let dictionary = &mapping.dictionaries.cip;
     let mut keys = Keys::new("the script", table, 0..0, problems);
-    let title = match keys.find("title") {
-        Some(value) => match value.get_ref().as_str() {
-            Some(title) => Some(title.to_owned()),
-            None => return reader::wrong(value, "title", "a string", problems),
-        },
-        None => None,
-    };
+    let title = reader::title(&mut keys)?;
     let unexpected = keys.word_or("unexpected_faults", UNEXPECTED_FAULTS, true);
     let format = connection::format(table.get("connection"));
     let axes = connection::axes(keys.find("axis"), format, dictionary, problems);

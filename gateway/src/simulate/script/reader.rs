@@ -9,7 +9,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::config::duration;
-use crate::finding::{Problem, registry as code};
+use crate::finding::{Findings, Problem, Source, registry as code, tree};
 
 /// A value with its place.
 pub(in crate::simulate) type Value<'t> = Spanned<DeValue<'t>>;
@@ -29,6 +29,35 @@ impl Problems {
     /// What was found, in the order of the file.
     pub fn take(self) -> Vec<Problem> {
         self.0.into_inner()
+    }
+}
+
+/// What `read` makes of the text of a script; `name` stands in the errors.
+///
+/// # Errors
+/// Every fault found, of the syntax and by `read`. What stands behind a fault of the syntax may be read wrongly.
+pub(in crate::simulate) fn parsed<T>(
+    source: &str,
+    name: &str,
+    read: impl FnOnce(&DeTable<'_>, &Problems) -> Option<T>,
+) -> Result<T, Findings> {
+    let mut findings = Findings::default();
+    let text = Source::new(name, source);
+    let problems = Problems::default();
+    let script = tree(source, &text, &mut findings).and_then(|table| read(table.get_ref(), &problems));
+    problems.take().into_iter().for_each(|problem| findings.push(&text, problem));
+    match script {
+        Some(script) if findings.is_empty() => Ok(script),
+        _ => Err(findings),
+    }
+}
+
+/// What a script is about, if it says so.
+pub(in crate::simulate) fn title(keys: &mut Keys<'_, '_>) -> Option<Option<String>> {
+    let Some(value) = keys.find("title") else { return Some(None) };
+    match value.get_ref().as_str() {
+        Some(title) => Some(Some(title.to_owned())),
+        None => wrong(value, "title", "a string", keys.problems),
     }
 }
 

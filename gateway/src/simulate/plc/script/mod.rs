@@ -26,7 +26,7 @@ use toml::de::{DeTable, DeValue};
 use self::steps::Frame;
 use super::{Images, Plan, Planned, PlcError};
 use crate::config::{Config, FILE_LEN_MAX};
-use crate::finding::{Findings, Source, read_file, tree};
+use crate::finding::{Findings, read_file};
 use crate::simulate::script::reader::{self, Keys, Problems};
 
 /// Packet interval where nothing is said.
@@ -77,28 +77,13 @@ impl Script {
     /// # Errors
     /// Every fault found.
     pub fn parse(source: &str, name: &str, config: &Config) -> Result<Self, Findings> {
-        let mut findings = Findings::default();
-        let text = Source::new(name, source);
-        let problems = Problems::default();
-        let script = tree(source, &text, &mut findings)
-            .and_then(|table| read(table.get_ref(), source, config, &problems));
-        problems.take().into_iter().for_each(|problem| findings.push(&text, problem));
-        match script {
-            Some(script) if findings.is_empty() => Ok(script),
-            _ => Err(findings),
-        }
+        reader::parsed(source, name, |table, problems| read(table, source, config, problems))
     }
 }
 
 fn read(table: &DeTable<'_>, source: &str, config: &Config, problems: &Problems) -> Option<Script> {
     let mut keys = Keys::new("the script", table, 0..0, problems);
-    let title = match keys.find("title") {
-        Some(value) => match value.get_ref().as_str() {
-            Some(title) => Some(title.to_owned()),
-            None => return reader::wrong(value, "title", "a string", problems),
-        },
-        None => None,
-    };
+    let title = reader::title(&mut keys)?;
     let interval = interval(&mut keys)?;
     let device = device(&mut keys, config)?;
     let list = keys.find("step");
