@@ -1,6 +1,5 @@
 //! Places for the connections of a server: for hosts that it serves, and never all of them for one.
 
-use std::fmt;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -21,18 +20,13 @@ pub enum NoPlace {
 }
 
 /// A bounded number of places.
+#[derive(Debug)]
 pub struct Places {
     hosts: Hosts,
     max: usize,
     of_host_max: usize,
     /// The host of each place that is taken.
     taken: Mutex<Vec<IpAddr>>,
-}
-
-impl fmt::Debug for Places {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Places").field("max", &self.max).finish_non_exhaustive()
-    }
 }
 
 /// A place; it is free again when this is dropped.

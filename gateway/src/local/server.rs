@@ -23,7 +23,6 @@ use tracing::{info, warn};
 use super::drive::job::{Ask, Context, Job, Step};
 use super::protocol::{self, BadRequest, FileRequest, LINE_MAX, NamedParameter};
 use crate::bundle::Sources;
-use crate::config::AxisKind;
 use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
 use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
 use crate::history::{LogQuery, Selection};
@@ -54,8 +53,6 @@ const HUB_INTERVAL: Duration = Duration::from_millis(2);
 pub struct Shared {
     /// Names of the axes in the order of the configuration.
     pub names: Vec<String>,
-    /// Rotary or linear, in the order of the axes: it decides the unit in replies.
-    pub kinds: Vec<AxisKind>,
     /// Parameters that can be read and written by name.
     pub parameters: Vec<NamedParameter>,
     /// What is known of the drives.
@@ -117,9 +114,11 @@ impl Shared {
 
     /// The state of an axis in the words of the protocol.
     fn state(&self, axis: usize) -> String {
-        let status = self.sources.status.read();
-        let kind = self.kinds.get(axis).copied().unwrap_or(AxisKind::Rotary);
-        status.axes.get(axis).map_or_else(String::new, |axis| protocol::state(axis, kind))
+        let Sources { status, installation, .. } = &*self.sources;
+        let (status, named) = (status.read(), installation.axes.get(axis));
+        named
+            .zip(status.axes.get(axis))
+            .map_or_else(String::new, |(named, axis)| protocol::state(axis, named.kind))
     }
 }
 
@@ -589,7 +588,7 @@ mod tests {
     use super::super::installation::{Installation, NamedAxis};
     use super::super::overview::Overview;
     use super::*;
-    use crate::config::TimeSource;
+    use crate::config::{AxisKind, TimeSource};
     use crate::engine::direct::{DirectFailure, Direction, Target};
     use crate::engine::local::Failure;
     use crate::engine::notice::Notice;
@@ -638,7 +637,6 @@ mod tests {
             access: Access::Write,
             range: None,
         };
-        let kinds = vec![AxisKind::Rotary, AxisKind::Linear];
         let follower =
             FollowerConfig { identity: [1; 8], domain: 0, threshold: 10_000, asymmetry: 0, seed: 1 };
         let installation = Installation {
@@ -651,7 +649,6 @@ mod tests {
         let time = TimeView::of(TimeStatus::ptp(&follower));
         Shared {
             names,
-            kinds,
             parameters: vec![code],
             catalogue: Catalogue::new(
                 vec![Bus::Sercos, Bus::Devicenet { attributes: Vec::new() }],

@@ -148,8 +148,8 @@ impl Core {
 
     /// Whether this host is served at all.
     pub fn admits(&self, peer: SocketAddrV4) -> bool {
-        let controllers = &self.adapter.config().controllers;
-        self.tools.has_v4(*peer.ip()) || (controllers.are_listed() && controllers.has_v4(*peer.ip()))
+        let host = *peer.ip();
+        self.tools.has_v4(host) || self.adapter.config().controllers.has_v4(host)
     }
 
     /// The answer to a datagram; none to a host that is not served.

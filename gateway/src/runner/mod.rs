@@ -397,7 +397,6 @@ pub fn start(
         .map(|path| {
             let shared = Shared {
                 names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
-                kinds: config.axes.iter().map(|axis| axis.kind).collect(),
                 parameters: NamedParameter::of(engine.mapping()),
                 catalogue: Catalogue::of(config, engine.mapping()),
                 limit: Arc::clone(&limit),

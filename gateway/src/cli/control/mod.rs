@@ -26,10 +26,14 @@ use crate::local::protocol::printable;
 /// How long an order may take: a long move at a low velocity.
 const PATIENCE: Duration = Duration::from_secs(3_600);
 
-/// Runs the command in the way that its arguments say.
+/// The same of what is asked while keys are read: disabling an axis that stops and coasts for as long as it may. The keys are not
+/// read meanwhile, not even Ctrl-C.
+const JOG_PATIENCE: Duration = Duration::from_secs(65);
+
+/// Carries out requests of the command line, of standard input, or of keys.
 pub fn run(arguments: &ControlArguments) -> Result<ExitCode, CliError> {
     if let (Some(axis), Some(velocity)) = (&arguments.jog, &arguments.velocity) {
-        let client = GatewayClient::connect(&arguments.local, PATIENCE)?;
+        let client = GatewayClient::connect(&arguments.local, JOG_PATIENCE)?;
         return jog::run(client, axis, velocity, arguments.acceleration.as_deref());
     }
     if !arguments.requests.is_empty() {
@@ -71,13 +75,13 @@ fn meant(line: &str) -> Option<&str> {
 /// The requests of a terminal. Replies come in the order in which orders are done, as they do on the socket.
 fn typed(arguments: &ControlArguments) -> Result<ExitCode, CliError> {
     let stream = GatewayClient::connect(&arguments.local, PATIENCE)?.into_stream();
-    let (told, replies) = channel();
+    let (sender, replies) = channel();
     let reader = stream.try_clone()?;
     let shown = std::thread::spawn(move || -> std::io::Result<()> {
         for line in BufReader::new(reader).lines() {
             let line = line?;
             // Whoever waits has gone when this fails.
-            let _ = told.send(line.split(' ').next().map(str::to_owned).unwrap_or_default());
+            let _ = sender.send(line.split(' ').next().map(str::to_owned).unwrap_or_default());
             let mut out = std::io::stdout().lock();
             writeln!(out, "{}", printable(&line)).and_then(|()| out.flush())?;
         }
@@ -128,13 +132,13 @@ mod tests {
 
     #[test]
     fn replies_are_counted_and_lists_are_not() {
-        let (told, replies) = channel();
+        let (sender, replies) = channel();
         for word in ["parameter", "parameter", "ok", "error", "ok"] {
-            told.send(word.to_owned()).unwrap();
+            sender.send(word.to_owned()).unwrap();
         }
         assert_eq!(wait(&replies, 1), Some(false));
         assert_eq!(wait(&replies, 2), Some(true));
-        drop(told);
+        drop(sender);
         assert_eq!((wait(&replies, 0), wait(&replies, 1)), (Some(false), None));
     }
 }

@@ -88,12 +88,12 @@ pub fn run(
     let plan = Plan::of(config, 0, interval).ok_or("the device of the demonstration has no assemblies")?;
     let plan = Plan { address, ..plan };
     let steps = steps(&plan, plans, seconds);
-    let mut told = "";
+    let mut shown = "";
     let outcome = plc::run(&plan, &steps, stop, &mut |event| match event {
         Event::Connected => progress.step(&format!("connected to the assemblies at {address}")),
-        Event::Begun(step) if steps[step].title != told => {
-            told = &steps[step].title;
-            progress.step(told);
+        Event::Begun(step) if steps[step].title != shown => {
+            shown = &steps[step].title;
+            progress.step(shown);
         }
         Event::Closed => progress.step("closed"),
         Event::Begun(_) | Event::Done(..) => {}

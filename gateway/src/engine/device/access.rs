@@ -155,36 +155,47 @@ impl Accesses {
             }
         }
         let (request, write) = match &access.operation {
-            AccessOperation::Read(_) => (Access::read(held.item), false),
-            AccessOperation::Write(bytes) => (on.write(&entry, bytes, parameter, held)?, true),
+            AccessOperation::Read(_) => (Access::read(held.item), None),
+            AccessOperation::Write(bytes) => {
+                let request = on.write(&entry, bytes, parameter, held)?;
+                let write = self.begin_write(access, (bytes, &request), held, &mapping.cip.sequence)?;
+                (request, Some(write))
+            }
         };
         let (number, purpose) = (on.axis_number, on.original(false));
         if !self.originals.ask_before(&request, |before| buses.access(number, before, purpose)) {
             return Err(on.unasked());
         }
-        let written = match (&access.operation, &request.operation) {
-            (AccessOperation::Write(bytes), Operation::Write(raw)) => {
-                if self.writes.is_full() {
-                    return Err(GeneralStatus::RESOURCE_UNAVAILABLE);
-                }
-                let too_much = |_| GeneralStatus::TOO_MUCH_DATA;
-                let sequence = &mapping.cip.sequence;
-                Some(Write {
-                    ticket: access.ticket,
-                    attribute: access.id,
-                    bytes: ArrayVec::try_from(&bytes[..]).map_err(too_much)?,
-                    raw: ArrayVec::try_from(raw.as_slice()).map_err(too_much)?,
-                    item: held.item,
-                    is_readable: held.from_drive.is_some(),
-                    is_kept: is_of_sequence(access.id, sequence),
-                    stage: WriteStage::Written,
-                })
-            }
-            _ => None,
-        };
-        on.ask(access, &request, write, buses)?;
-        self.writes.extend(written);
+        on.ask(access, &request, write.is_some(), buses)?;
+        self.writes.extend(write);
         Ok(())
+    }
+
+    /// What is remembered of a write, if there is room for it.
+    fn begin_write(
+        &self,
+        access: &AttributeAccess,
+        (bytes, request): (&[u8], &Access),
+        held: &ParameterEntry,
+        sequence: &SequenceAttributes,
+    ) -> Result<Write, GeneralStatus> {
+        if self.writes.is_full() {
+            return Err(GeneralStatus::RESOURCE_UNAVAILABLE);
+        }
+        let Operation::Write(raw) = &request.operation else {
+            return Err(GeneralStatus::ATTRIBUTE_NOT_SETTABLE);
+        };
+        let too_much = |_| GeneralStatus::TOO_MUCH_DATA;
+        Ok(Write {
+            ticket: access.ticket,
+            attribute: access.id,
+            bytes: ArrayVec::try_from(bytes).map_err(too_much)?,
+            raw: ArrayVec::try_from(raw.as_slice()).map_err(too_much)?,
+            item: held.item,
+            is_readable: held.from_drive.is_some(),
+            is_kept: is_of_sequence(access.id, sequence),
+            stage: WriteStage::Written,
+        })
     }
 
     /// Asks the drive for a value that it lets only be read, to compare it with what the controller sets.

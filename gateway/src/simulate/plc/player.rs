@@ -6,9 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use profile_cip::assembly::Control;
-use profile_cip::assembly::Refusal;
 use profile_cip::assembly::handshake::Status;
-use profile_generic::fault::FaultCause;
 
 use super::line::{Counts, Line};
 use super::session::Session;
@@ -83,7 +81,7 @@ impl fmt::Display for Failure {
 }
 
 /// Connects, carries out the steps, takes the torque of all axes away and closes.
-pub fn run(plan: &Plan, steps: &[Planned], stop: &AtomicBool, tell: &mut dyn FnMut(Event<'_>)) -> Outcome {
+pub fn run(plan: &Plan, steps: &[Planned], stop: &AtomicBool, report: &mut dyn FnMut(Event<'_>)) -> Outcome {
     let mut outcome = Outcome {
         axes: vec![AxisReport::default(); plan.names.len()],
         cycles: 0,
@@ -110,13 +108,13 @@ pub fn run(plan: &Plan, steps: &[Planned], stop: &AtomicBool, tell: &mut dyn FnM
     };
     let mut failure = match player.connect() {
         Ok(()) => {
-            tell(Event::Connected);
-            player.steps(steps, tell)
+            report(Event::Connected);
+            player.steps(steps, report)
         }
         Err(error) => Some(Failure { step: None, error }),
     };
     match player.end() {
-        Ok(()) => tell(Event::Closed),
+        Ok(()) => report(Event::Closed),
         Err(error) => {
             failure.get_or_insert(Failure { step: None, error });
         }
@@ -152,13 +150,13 @@ struct Wait<'a> {
 }
 
 impl Player<'_> {
-    fn steps(&mut self, steps: &[Planned], tell: &mut dyn FnMut(Event<'_>)) -> Option<Failure> {
+    fn steps(&mut self, steps: &[Planned], report: &mut dyn FnMut(Event<'_>)) -> Option<Failure> {
         for (number, planned) in steps.iter().enumerate() {
-            tell(Event::Begun(number));
+            report(Event::Begun(number));
             if let Err(error) = self.step(&planned.step, planned.within) {
                 return Some(Failure { step: Some(number), error });
             }
-            tell(Event::Done(number, &self.images));
+            report(Event::Done(number, &self.images));
         }
         None
     }
@@ -215,10 +213,13 @@ impl Player<'_> {
 
     /// One interval.
     fn interval(&mut self) -> Result<(), PlcError> {
-        if self.stop.load(Ordering::Relaxed) {
-            return Err(PlcError::Stopped);
-        }
+        self.check_stop()?;
         self.exchange()
+    }
+
+    /// Fails once the controller is to stop.
+    fn check_stop(&self) -> Result<(), PlcError> {
+        if self.stop.load(Ordering::Relaxed) { Err(PlcError::Stopped) } else { Ok(()) }
     }
 
     fn exchange(&mut self) -> Result<(), PlcError> {
@@ -304,15 +305,17 @@ impl Player<'_> {
         }
     }
 
-    fn enable(&mut self, axes: &[usize], within: Duration) -> Result<(), PlcError> {
-        let unlock = Wait { axes, step: "unlock", within, with_faults: false };
-        // What was refused before stands until an order is taken.
-        let unlocked = |images: &Images, axis: usize| {
+    /// Sends a word of 0 until axes take orders.
+    fn unlock(&mut self, wait: Wait<'_>) -> Result<(), PlcError> {
+        self.until(Wait { step: "unlock", ..wait }, Control::empty(), |images, axis| {
             let status = images.status(axis);
             status.contains(Status::RUN) && !status.contains(Status::LOCKED)
-        };
-        self.until(unlock, Control::empty(), unlocked)?;
-        let enable = Wait { step: "enable", ..unlock };
+        })
+    }
+
+    fn enable(&mut self, axes: &[usize], within: Duration) -> Result<(), PlcError> {
+        let enable = Wait { axes, step: "enable", within, with_faults: false };
+        self.unlock(enable)?;
         self.until(enable, Control::ENABLE, |images, axis| images.status(axis).contains(Status::ENABLED))
     }
 
@@ -322,12 +325,8 @@ impl Player<'_> {
     }
 
     fn fault_reset(&mut self, axes: &[usize], within: Duration) -> Result<(), PlcError> {
-        let unlock = Wait { axes, step: "unlock", within, with_faults: true };
-        self.until(unlock, Control::empty(), |images, axis| {
-            let status = images.status(axis);
-            status.contains(Status::RUN) && !status.contains(Status::LOCKED)
-        })?;
-        let reset = Wait { step: "reset its fault", ..unlock };
+        let reset = Wait { axes, step: "reset its fault", within, with_faults: true };
+        self.unlock(reset)?;
         self.until(reset, Control::RESET, |images, axis| !images.status(axis).contains(Status::FAULT))?;
         axes.iter().try_for_each(|axis| self.images.set_word(*axis, Control::empty()))?;
         self.interval()
@@ -417,9 +416,7 @@ impl Player<'_> {
     fn silence(&mut self, span: Duration) -> Result<(), PlcError> {
         let end = Instant::now() + span;
         while Instant::now() < end {
-            if self.stop.load(Ordering::Relaxed) {
-                return Err(PlcError::Stopped);
-            }
+            self.check_stop()?;
             let next = end.min(Instant::now() + self.plan.interval);
             let line = self.line.as_mut().ok_or(PlcError::Unconnected)?;
             line.listen(next, self.plan, &mut self.images, &mut self.counts)?;
@@ -428,9 +425,7 @@ impl Player<'_> {
     }
 
     fn sleep(&self, end: Instant) -> Result<(), PlcError> {
-        if self.stop.load(Ordering::Relaxed) {
-            return Err(PlcError::Stopped);
-        }
+        self.check_stop()?;
         std::thread::sleep(end.saturating_duration_since(Instant::now()).min(self.plan.interval));
         Ok(())
     }
@@ -466,15 +461,11 @@ fn meets(images: &Images, axis: usize, condition: Condition) -> (bool, String) {
         }
         Condition::Fault(cause) => {
             let found = images.fault(axis);
-            let text =
-                if found == FaultCause(0) { "no fault".to_owned() } else { format!("the fault {found}") };
-            (found == cause, text)
+            (found == cause, Condition::Fault(found).to_string())
         }
         Condition::Refusal(refusal) => {
             let found = images.refusal(axis);
-            let text =
-                if found == Refusal::NONE { "no refusal".to_owned() } else { format!("the refusal {found}") };
-            (found == refusal, text)
+            (found == refusal, Condition::Refusal(found).to_string())
         }
         Condition::Position { value, tolerance } => near(images.position(axis), value, tolerance, "counts"),
         Condition::Velocity { value, tolerance } => near(images.velocity(axis), value, tolerance, "counts/s"),

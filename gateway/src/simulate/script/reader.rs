@@ -8,6 +8,7 @@ use profile_generic::time::DurationNs;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::attributes::nearest;
 use crate::config::duration;
 use crate::finding::{Findings, Problem, Source, registry as code, tree};
 
@@ -58,6 +59,40 @@ pub(in crate::simulate) fn title(keys: &mut Keys<'_, '_>) -> Option<Option<Strin
     match value.get_ref().as_str() {
         Some(title) => Some(Some(title.to_owned())),
         None => wrong(value, "title", "a string", keys.problems),
+    }
+}
+
+/// The one verb of a step, and its arguments. `modifiers` are the keys of a step that are none; `expected` is said of a second verb.
+pub(in crate::simulate) fn verb<'a, 't, R>(
+    value: &Value<'_>,
+    keys: &mut Keys<'a, 't>,
+    verbs: &'static [(&'static str, R)],
+    modifiers: &[&str],
+    expected: &str,
+) -> Option<(&'static R, &'a Value<'t>)> {
+    let mut found: Option<(&(&'static str, R), &Value<'_>)> = None;
+    for (name, place, arguments) in keys.keys() {
+        let Some(verb) = verbs.iter().find(|(known, _)| *known == name) else { continue };
+        if let Some(((first, _), _)) = found.replace((verb, arguments)) {
+            let title = format_args!("`{name}` is a second verb besides `{first}`");
+            return keys.problems.report(place, title, expected);
+        }
+        keys.find(verb.0);
+    }
+    if let Some(((_, read), arguments)) = found {
+        return Some((read, arguments));
+    }
+    let expected = "expected a verb, such as enable or move";
+    match keys.keys().find(|(name, ..)| !modifiers.contains(name)) {
+        Some((name, place, _)) => {
+            let near = nearest(name, verbs.iter().map(|(name, _)| *name));
+            let hint = near.map_or_else(|| expected.to_owned(), |near| format!("did you mean `{near}`?"));
+            keys.problems.report(place, format_args!("`{name}` is no step"), hint)
+        }
+        None => {
+            let title = format!("the step is {} without a verb", kind(value.get_ref()));
+            keys.problems.report(value.span(), title, expected)
+        }
     }
 }
 

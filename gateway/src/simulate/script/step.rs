@@ -10,7 +10,7 @@ use profile_generic::time::DurationNs;
 use toml::de::DeValue;
 
 use super::connection::{MotionDefaults, TARGETS, time_data};
-use super::reader::{Keys, Problems, Value, folded, kind, table, time, whole, word_of, wrong};
+use super::reader::{Keys, Problems, Value, folded, table, time, title, verb, whole, word_of, wrong};
 use super::{events, exchange, expect, misbehave, motion};
 use crate::mapping::CipDictionary;
 
@@ -225,42 +225,10 @@ fn nested(value: &Value<'_>, key: &str, frame: &Frame<'_>) -> Option<Vec<Step>> 
 pub(super) fn step(value: &Value<'_>, frame: &Frame<'_>) -> Option<(Step, Option<String>)> {
     let mut keys = table(value, "the step", frame.problems)?;
     let mut modifiers = Modifiers::read(&mut keys)?;
-    let title = match keys.find("title") {
-        Some(value) => match value.get_ref().as_str() {
-            Some(title) => Some(title.to_owned()),
-            None => return wrong(value, "title", "a string", frame.problems),
-        },
-        None => None,
-    };
-    let mut found: Option<(&Verb, &Value<'_>)> = None;
-    for (name, span, value) in keys.keys() {
-        let Some(verb) = VERBS.iter().find(|(known, _)| *known == name) else { continue };
-        if let Some((first, _)) = found.replace((verb, value)) {
-            return frame.problems.report(
-                span,
-                format_args!("`{name}` is a second verb besides `{}`", first.0),
-                "expected one verb in a step; steps at once go into together = [...]",
-            );
-        }
-        keys.find(verb.0);
-    }
-    let Some(((_, read), arguments)) = found else {
-        let unknown = keys.keys().find(|(name, ..)| !["within", "wait", "refused", "title"].contains(name));
-        let known = VERBS.iter().map(|(name, _)| *name);
-        return match unknown {
-            Some((name, span, _)) => {
-                let near = super::attributes::nearest(name, known);
-                let hint = near.map(|near| format!("did you mean `{near}`?"));
-                let expected = hint.unwrap_or_else(|| "expected a verb, such as enable or move".to_owned());
-                frame.problems.report(span, format_args!("`{name}` is no step"), expected)
-            }
-            None => frame.problems.report(
-                value.span(),
-                format_args!("the step is {} without a verb", kind(value.get_ref())),
-                "expected a verb, such as enable or move",
-            ),
-        };
-    };
+    let title = title(&mut keys)?;
+    let expected = "expected one verb in a step; steps at once go into together = [...]";
+    let others = ["within", "wait", "refused", "title"];
+    let (read, arguments) = verb(value, &mut keys, VERBS, &others, expected)?;
     keys.finish()?;
     let mut step = read(arguments, frame, &mut modifiers)?;
     if let Some(time_out) = modifiers.within {

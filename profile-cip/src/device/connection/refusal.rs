@@ -20,13 +20,12 @@ pub(crate) struct Refusal {
 
 impl Refusal {
     pub fn new(general: GeneralStatus, extended: u16) -> Self {
-        let extended = ArrayVec::from_iter([extended]);
-        Self { general, extended, found: None, expected: None, remaining_path_words: 0 }
+        Self { extended: ArrayVec::from_iter([extended]), ..Self::general(general) }
     }
 
     /// A general status alone.
     pub fn general(general: GeneralStatus) -> Self {
-        Self { extended: ArrayVec::new(), ..Self::new(general, 0) }
+        Self { general, extended: ArrayVec::new(), found: None, expected: None, remaining_path_words: 0 }
     }
 
     /// General status 0x01 and this extended one.

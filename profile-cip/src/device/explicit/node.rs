@@ -97,8 +97,8 @@ pub(crate) struct Node {
     requests: VecDeque<MotionRequest>,
     events: VecDeque<Event>,
     next_token: u64,
-    /// The host that owned the device last.
-    pub former_owner: Option<Ipv4Addr>,
+    /// The host that owns the device, or was the last one to do so.
+    pub last_owner: Option<Ipv4Addr>,
 }
 
 impl Node {
@@ -115,7 +115,7 @@ impl Node {
             requests: VecDeque::with_capacity(REQUESTS_MAX),
             events: VecDeque::with_capacity(EVENTS_MAX),
             next_token: 1,
-            former_owner: None,
+            last_owner: None,
             config,
         }
     }
@@ -344,7 +344,7 @@ impl Node {
                 } else {
                     self.connections.motion = Motion::Open(owner);
                     self.connections.motion_lost = false;
-                    self.former_owner = Some(owner.open.originator);
+                    self.last_owner = Some(owner.open.originator);
                     self.tell(opened(&owner));
                 }
             }

@@ -58,9 +58,7 @@ impl Node {
     /// Whether streams are kept for this host: it is listed as a controller, or owns the device, or did so last.
     pub fn is_controller(&self, host: Ipv4Addr) -> bool {
         let controllers = &self.config.controllers;
-        let owner = self.connections.motion.parameters().map(|open| open.originator);
-        let is_listed = controllers.are_listed() && controllers.has_v4(host);
-        is_listed || owner == Some(host) || self.former_owner == Some(host)
+        (controllers.are_listed() && controllers.has_v4(host)) || self.last_owner == Some(host)
     }
 
     /// Fails for a client that must not own the device.

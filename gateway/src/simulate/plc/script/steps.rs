@@ -11,9 +11,8 @@ use toml::de::DeValue;
 use crate::simulate::plc::image::fits;
 use crate::simulate::plc::step::names;
 use crate::simulate::plc::{Condition, HANDSHAKE, Images, Movement, Plan, Planned, PlcError, Step};
-use crate::simulate::script::attributes::nearest;
 use crate::simulate::script::reader::{
-    Keys, Problems, Value, kind, number, table, time, whole, word_of, words, wrong,
+    self, Keys, Problems, Value, number, table, time, whole, word_of, words, wrong,
 };
 
 /// How long a movement may take, and an expectation, where the step does not say.
@@ -55,41 +54,13 @@ const VERBS: &[Verb] = &[
 pub(super) fn step(value: &Value<'_>, line: usize, frame: &Frame<'_>) -> Option<Planned> {
     let problems = frame.problems;
     let mut keys = table(value, "the step", problems)?;
-    let own_title = match keys.find("title") {
-        Some(value) => match value.get_ref().as_str() {
-            Some(title) => Some(title.to_owned()),
-            None => return wrong(value, "title", "a string", problems),
-        },
-        None => None,
-    };
+    let own_title = reader::title(&mut keys)?;
     let own_time = match keys.find("within") {
         Some(value) => Some(span(value, "within", problems)?),
         None => None,
     };
-    let mut found: Option<(&Verb, &Value<'_>)> = None;
-    for (name, place, value) in keys.keys() {
-        let Some(verb) = VERBS.iter().find(|(known, _)| *known == name) else { continue };
-        if let Some((first, _)) = found.replace((verb, value)) {
-            let title = format!("`{name}` is a second verb besides `{}`", first.0);
-            return problems.report(place, title, "expected one verb in a step");
-        }
-        keys.find(verb.0);
-    }
-    let Some(((_, read), arguments)) = found else {
-        let unknown = keys.keys().find(|(name, ..)| !["within", "title"].contains(name));
-        let expected = "expected a verb, such as enable or move";
-        return match unknown {
-            Some((name, place, _)) => {
-                let near = nearest(name, VERBS.iter().map(|(name, _)| *name));
-                let hint = near.map_or_else(|| expected.to_owned(), |near| format!("did you mean `{near}`?"));
-                problems.report(place, format_args!("`{name}` is no step"), hint)
-            }
-            None => {
-                let title = format!("the step is {} without a verb", kind(value.get_ref()));
-                problems.report(value.span(), title, expected)
-            }
-        };
-    };
+    let (read, arguments) =
+        reader::verb(value, &mut keys, VERBS, &["within", "title"], "expected one verb in a step")?;
     keys.finish()?;
     let (step, within, title) = read(arguments, frame)?;
     let (within, title) = (own_time.unwrap_or(within), own_title.unwrap_or(title));
