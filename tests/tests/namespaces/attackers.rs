@@ -40,7 +40,7 @@ const GROWTH_MAX_KB: u64 = 48_000;
 type Attack = fn(Instant) -> u64;
 
 /// The attacks by name.
-const ATTACKS: [(&str, Attack); 16] = [
+const ATTACKS: [(&str, Attack); 18] = [
     ("List requests, UDP 44818", |end| datagrams(end, list_identity)),
     ("octets without a meaning, UDP 44818", |end| datagrams(end, noise)),
     ("connections opened and closed, TCP 44818", |end| connects(end, EXPLICIT)),
@@ -50,6 +50,10 @@ const ATTACKS: [(&str, Attack); 16] = [
     ("lengths of 65535 bytes, TCP 44818", |end| streams(end, EXPLICIT, oversized)),
     ("Forward_Opens of the motion connection", |end| requests(end, &motion_open())),
     ("Set_Attribute_Single of an axis", |end| requests(end, &set_axis())),
+    ("Set_Attribute_Single of the inactivity time-out", |end| {
+        requests(end, &set_network(0xF5, 13, &[10, 0]))
+    }),
+    ("Set_Attribute_Single of a code point", |end| requests(end, &set_network(0x48, 4, &[0]))),
     ("Resets", |end| requests(end, &message(Service::RESET, &[0x20, 1, 0x24, 1], &[0]))),
     ("requests whose answers are not read, TCP 44818", unread),
     ("requests, HTTP", |end| streams(end, HTTP, get_metrics)),
@@ -118,6 +122,11 @@ fn motion_open() -> Vec<u8> {
 /// Position Trim of the first axis: set by somebody else it would be a jump.
 fn set_axis() -> Vec<u8> {
     message(Service::SET_ATTRIBUTE_SINGLE, &[0x20, 0x42, 0x24, 1, 0x31, 0, 0x5C, 0x01], &[0; 8])
+}
+
+/// An attribute of the network, which is kept in the device.
+fn set_network(class: u8, attribute: u8, value: &[u8]) -> Vec<u8> {
+    message(Service::SET_ATTRIBUTE_SINGLE, &[0x20, class, 0x24, 1, 0x30, attribute], value)
 }
 
 fn list_identity(_: &mut Random) -> Vec<u8> {
