@@ -111,7 +111,7 @@ pub use sercos::facts::{Difference, DriveFacts};
 pub use sercos::fixed_connections::{FixedConnection, FixedConnections};
 pub use sercos::scaling::{AxisUnits, Lsb, Rated, Reference, ScalingError, ScalingRule};
 pub use sercos::tables::{ReportRule, SercosTables};
-pub use truth::{AttributeTruth, Truth};
+pub use truth::{AttributeTruth, ParameterPlace, Truth};
 
 use crate::finding::{Findings, Severity};
 use profile_cip::device::attribute::{DefaultValue, ElementRule};

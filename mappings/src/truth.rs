@@ -8,7 +8,7 @@ use super::Mapping;
 use super::attributes::{AttributeEntry, AttributeTable, Backing};
 use super::cip_tables::Missing;
 use super::dictionary::Access;
-use super::drive_program::DriveProgram;
+use super::drive_program::{DriveProgram, ParameterEntry};
 use profile_generic::parameter::Parameter;
 
 /// What success means.
@@ -64,6 +64,46 @@ pub struct AttributeTruth<'a> {
     pub by: String,
 }
 
+/// Where the value of a parameter is, for an axis with a certain drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ParameterPlace<'a> {
+    /// The drive has it.
+    Drive(&'a ParameterEntry),
+    /// The configuration has it, and the drive does not show it. In the unit of the generic model.
+    Configuration(i64),
+    /// It is 0: the loops of the drive do not have such a term.
+    Zero,
+    /// The gateway goes by it.
+    Gateway,
+    /// It is kept and has no effect.
+    Stored,
+    /// Nobody has it.
+    Absent,
+}
+
+impl DriveProgram {
+    /// Where the value of a parameter is. `missing` is what the row of its attribute says for drives that do not have it.
+    #[must_use]
+    pub fn place(&self, parameter: Parameter, missing: Missing) -> ParameterPlace<'_> {
+        if let Some(held) = self.parameter(parameter) {
+            return ParameterPlace::Drive(held);
+        }
+        if let Some(value) = self.datum(parameter) {
+            return ParameterPlace::Configuration(value);
+        }
+        match missing {
+            Missing::Device | Missing::DeviceOrZero if self.can_go_by(parameter) => ParameterPlace::Gateway,
+            Missing::Zero | Missing::DeviceOrZero if self.has_parameters() && !self.is_own(parameter) => {
+                ParameterPlace::Zero
+            }
+            Missing::Stored => ParameterPlace::Stored,
+            Missing::Absent | Missing::Zero | Missing::Device | Missing::DeviceOrZero => {
+                ParameterPlace::Absent
+            }
+        }
+    }
+}
+
 impl Mapping {
     /// What is true of each attribute of an axis with this drive, in the order of their numbers.
     #[must_use]
@@ -84,6 +124,24 @@ impl Mapping {
             .collect();
         all.sort_by_key(|row| row.id);
         all
+    }
+
+    /// Whether anybody has an attribute of an axis with this drive: [`Truth::Absent`] otherwise.
+    #[must_use]
+    pub fn has(&self, entry: &AttributeEntry, drive: &DriveProgram) -> bool {
+        let (parameter, missing) = match entry.backing {
+            Backing::Mechanics(fact) => return drive.mechanical(fact).is_some(),
+            Backing::Signal { signal, otherwise: Some(parameter), .. } if !drive.tells(signal) => {
+                (parameter, Missing::Absent)
+            }
+            Backing::Parameter { parameter, missing, .. } => (parameter, missing),
+            _ => return true,
+        };
+        match (drive.place(parameter, missing), self.dictionaries.generic.computation(parameter)) {
+            (ParameterPlace::Drive(_) | ParameterPlace::Configuration(_), _) => true,
+            (_, Some(computation)) => computation.is_possible(drive),
+            (place, None) => place != ParameterPlace::Absent,
+        }
     }
 
     fn truth(&self, entry: &AttributeEntry, drive: &DriveProgram) -> (Truth, String) {
@@ -133,34 +191,23 @@ impl Mapping {
                 false => (Truth::Absent, format!("the drive lacks what {name} is computed from")),
             };
         }
-        match (drive.parameter(parameter), missing) {
-            (Some(held), _) if is_set && held.to_drive.is_none() => {
+        let of_torque_limits = parameter == Parameter::STOPPING_TORQUE;
+        match drive.place(parameter, missing) {
+            ParameterPlace::Drive(held) if is_set && held.to_drive.is_none() => {
                 (Truth::Compared, format!("{} of the drive", held.item))
             }
-            (Some(held), _) => (Truth::Live, held.item.to_string()),
-            (None, _) if drive.datum(parameter).is_some() => {
-                (Truth::Compared, "the configuration".to_owned())
-            }
-            (None, Missing::Absent) => (Truth::Absent, format!("the drive has no {name}")),
-            (None, Missing::Stored) => (Truth::Stored, format!("the drive has no {name}")),
-            (None, Missing::DeviceOrZero) if drive.can_go_by(parameter) => {
-                (Truth::Live, "the gateway goes by it".to_owned())
-            }
-            (None, Missing::Zero | Missing::DeviceOrZero)
-                if drive.has_parameters() && !drive.is_own(parameter) =>
-            {
-                (Truth::Compared, format!("0: the drive has no {name}"))
-            }
-            (None, Missing::Zero | Missing::DeviceOrZero) => {
-                (Truth::Absent, format!("the drive has no {name}"))
-            }
-            (None, Missing::Device) if !drive.can_go_by(parameter) => {
-                (Truth::Absent, drive.lacks(parameter).to_owned())
-            }
-            (None, Missing::Device) if parameter == Parameter::STOPPING_TORQUE => {
+            ParameterPlace::Drive(held) => (Truth::Live, held.item.to_string()),
+            ParameterPlace::Configuration(_) => (Truth::Compared, "the configuration".to_owned()),
+            ParameterPlace::Zero => (Truth::Compared, format!("0: the drive has no {name}")),
+            ParameterPlace::Gateway if of_torque_limits => {
                 (Truth::Compared, "the torque limits of the drive".to_owned())
             }
-            (None, Missing::Device) => (Truth::Live, "the gateway goes by it".to_owned()),
+            ParameterPlace::Gateway => (Truth::Live, "the gateway goes by it".to_owned()),
+            ParameterPlace::Stored => (Truth::Stored, format!("the drive has no {name}")),
+            ParameterPlace::Absent if missing == Missing::Device => {
+                (Truth::Absent, drive.lacks(parameter).to_owned())
+            }
+            ParameterPlace::Absent => (Truth::Absent, format!("the drive has no {name}")),
         }
     }
 }

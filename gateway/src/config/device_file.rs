@@ -63,7 +63,7 @@ type Values = (Vec<Write>, Option<[Vec<Pdo>; 2]>, Vec<KnownObject>);
 
 /// Reads one file.
 struct Loader<'l> {
-    /// The configuration of the box, and what it says of the device.
+    /// The configuration of the gateway, and what it says of the device.
     text: &'l Source,
     table: &'l CanDeviceTable,
     path: &'l Path,
@@ -90,8 +90,9 @@ impl Loader<'_> {
         if writes.is_empty() && !(self.device.keeps_mapping && pdos.is_some()) {
             let problem = Problem::new(code::DEVICE_FILE, self.span());
             let problem = problem.title("the file has no values for the device");
-            return self
-                .report(problem.expected("expected a `ParameterValue` that the box does not set itself"));
+            return self.report(
+                problem.expected("expected a `ParameterValue` that the gateway does not set itself"),
+            );
         }
         self.device.file = Some(DeviceFile { stamp: stamp(&writes), writes, pdos, objects });
         Some(())
@@ -179,7 +180,7 @@ impl Loader<'_> {
             names.extend((objects.len() > NAMED_MAX).then(|| format!("{} more", objects.len() - NAMED_MAX)));
             let span = place(source, Mux::new(first.index, first.sub));
             let problem = Problem::new(code::DEVICE_FILE_ODD, span);
-            let title = format!("what the box sets itself is not written: {}", names.join(", "));
+            let title = format!("what the gateway sets itself is not written: {}", names.join(", "));
             self.findings.push(source, problem.title(title));
         }
         if let Some(empty) = others.iter().find(|entry| entry.data.is_empty()) {
@@ -232,13 +233,13 @@ impl Loader<'_> {
     }
 }
 
-/// Whether the box sets an object itself where it maps the PDOs, or whether writing it would undo what the box needs.
+/// Whether the gateway sets an object itself where it maps the PDOs, or whether writing it would undo what the box needs.
 #[must_use]
 pub fn is_set_by_gateway(index: u16) -> bool {
     is_own(index, false)
 }
 
-/// Whether the box sets an object itself, or whether writing it would undo what the box needs.
+/// Whether the gateway sets an object itself, or whether writing it would undo what the box needs.
 fn is_own(index: u16, keeps_mapping: bool) -> bool {
     match index {
         // SYNC, guarding, storing and restoring, EMCY, heartbeats, the stamp; programs; network management.

@@ -11,13 +11,13 @@ use crate::status::{AxisStatus, BoxStatus, mode_code, state_code};
 /// Number of this map, in register 0. It changes when a register gets another meaning, not when one is added.
 pub const MAP_VERSION: u16 = 1;
 
-/// Registers of the box, and of each axis.
+/// Registers of the gateway, and of each axis.
 pub const BLOCK_LEN: u16 = 64;
 
 /// Address of the first axis block.
 pub const AXES_ADDRESS: u16 = BLOCK_LEN;
 
-/// Registers of the map: the block of the box and those of all axes that a box can have, configured or not.
+/// Registers of the map: the block of the gateway and those of all axes that a box can have, configured or not.
 pub const MAP_LEN: u16 = AXES_ADDRESS + BLOCK_LEN * AXES;
 
 const AXES: u16 = 64;
@@ -90,7 +90,7 @@ const fn entry<S>(
     Entry { offset, kind, name, meaning, value }
 }
 
-/// The block of the box.
+/// The block of the gateway.
 pub const BOX: &[Entry<BoxStatus>] = &[
     entry(0, Kind::U16, "map_version", "number of this map: 1", |_| u64::from(MAP_VERSION)),
     entry(
@@ -107,7 +107,7 @@ pub const BOX: &[Entry<BoxStatus>] = &[
     entry(4, Kind::U16, "connections", "open CIP Motion connections", |status| u64::from(status.connections)),
     entry(5, Kind::U16, "axes_address", "address of the first axis block: 64", |_| u64::from(AXES_ADDRESS)),
     entry(6, Kind::U16, "block_length", "registers of an axis block: 64", |_| u64::from(BLOCK_LEN)),
-    entry(8, Kind::U32, "uptime", "seconds since the box started", |status| {
+    entry(8, Kind::U32, "uptime", "seconds since the gateway started", |status| {
         (status.uptime.0.max(0) / 1_000_000_000).cast_unsigned()
     }),
     entry(10, Kind::U32, "cycle_time", "bus cycle in nanoseconds", |status| u64::from(status.cycle_time_ns)),

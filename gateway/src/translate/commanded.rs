@@ -107,7 +107,7 @@ impl Translator {
         node.push(shown_mode.shows([fact]));
         if let Some(mode) = replaced {
             node.push(Node::new(text!(
-                "Feedback Mode {}: the box refuses to enable an axis with it; translated as one with Motor Feedback",
+                "Feedback Mode {}: the gateway refuses to enable an axis with it; translated as one with Motor Feedback",
                 mode.source()
             )));
         }
@@ -251,7 +251,7 @@ impl Translator {
     }
 }
 
-/// What the box has said about an axis and its device: changes of state, refusals, and faults with their reasons.
+/// What the gateway has said about an axis and its device: changes of state, refusals, and faults with their reasons.
 pub(super) fn push_notices(node: &mut Node, said: &[Notice], number: usize, axis: &StageAxis) {
     let own = |notice: &&Notice| match notice {
         Notice::State { .. }

@@ -230,6 +230,13 @@ pub enum Condition {
         /// Its value.
         check: ValueCheck,
     },
+    /// What the device said last of the cyclic write data of the list in use.
+    CyclicWriteStatus {
+        /// Instance number.
+        axis: u8,
+        /// General status; 0 for success.
+        status: u8,
+    },
 }
 
 impl Condition {
@@ -247,7 +254,8 @@ impl Condition {
             | Self::Alarm { axis, .. }
             | Self::Event { axis, .. }
             | Self::Attribute { axis, .. }
-            | Self::CyclicRead { axis, .. } => Some(*axis),
+            | Self::CyclicRead { axis, .. }
+            | Self::CyclicWriteStatus { axis, .. } => Some(*axis),
             _ => None,
         }
     }
@@ -311,6 +319,9 @@ impl fmt::Display for Condition {
             Self::CyclicRead { attribute, check, .. } => {
                 write!(f, "attribute {attribute} {} in the cyclic read data", check.value)?;
                 if check.tolerance > 0.0 { write!(f, " within {}", check.tolerance) } else { Ok(()) }
+            }
+            Self::CyclicWriteStatus { status, .. } => {
+                write!(f, "status 0x{status:02X} of the cyclic write data")
             }
         }
     }

@@ -100,7 +100,7 @@ fn check_condition(condition: &Condition) -> Result<(), Failure> {
         }
         Condition::Event { .. } => "no events",
         Condition::Synchronous(true) => "no time synchronization",
-        Condition::CyclicRead { .. } => "no cyclic write and read data",
+        Condition::CyclicRead { .. } | Condition::CyclicWriteStatus { .. } => "no cyclic write and read data",
         _ => return Ok(()),
     };
     Err(Failure::NotInFormat { what })

@@ -12,6 +12,7 @@ mod can_modes;
 mod computed_values;
 mod counters;
 mod cyclic_reads;
+mod cyclic_writes;
 mod defaults;
 mod devicenet;
 mod drive_commands;

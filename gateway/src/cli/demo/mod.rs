@@ -1,6 +1,6 @@
 //! `axisbridge demo`: the whole chain in one process.
 //!
-//! A CIP Motion controller or a PLC on real TCP and UDP sockets, the box as `run` runs it, and behind it simulated drives inside the
+//! A CIP Motion controller or a PLC on real TCP and UDP sockets, the gateway as `run` runs it, and behind it simulated drives inside the
 //! process, which get and give the very same frames as on a wire: of SERCOS III, of CANopen, of DeviceNet, or
 //! one of each. Controller and gateway read the host's clock, or are two clocks that follow a third one ([`clocks`]).
 
@@ -206,7 +206,7 @@ fn wait_until_ready(running: &RunningBox, progress: &mut Progress) -> Result<(),
         if Instant::now() > end {
             let state = status.state;
             return Err(format!(
-                "expected every bus in operation within {START_TIME_OUT:?}, the box is {state}"
+                "expected every bus in operation within {START_TIME_OUT:?}, the gateway is {state}"
             )
             .into());
         }

@@ -83,7 +83,7 @@ fn check_bus(problems: &mut Problems, table: &CanTable) -> Option<Can> {
         problems.help(format!("write {thousands} if this is in kbit/s"));
     }
     let cycle_time = sync_time(problems, &table.cycle_time);
-    let node = value::number_or(problems, &table.node, "the node-id of the box", NODES, DEFAULT_NODE);
+    let node = value::number_or(problems, &table.node, "the node-id of the gateway", NODES, DEFAULT_NODE);
     let heartbeat_ms = match &table.heartbeat {
         None => Some(DEFAULT_HEARTBEAT_MS),
         Some(text) => watch_time(problems, text, "the time between heartbeats"),

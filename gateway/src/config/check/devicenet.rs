@@ -43,7 +43,7 @@ fn network(problems: &mut Problems, table: &DevicenetTable) -> Option<Devicenet>
     let link = can::can_link(problems, &table.interface, table.set_bit_rate);
     let rate = data_rate(problems, table.bit_rate.as_ref());
     let cycle_time = whole_milliseconds(problems, &table.cycle_time, "the cycle of a DeviceNet", CYCLE_MS);
-    let mac = value::number_or(problems, &table.mac_id, "the MAC ID of the box", MAC_IDS, DEFAULT_MAC_ID);
+    let mac = value::number_or(problems, &table.mac_id, "the MAC ID of the gateway", MAC_IDS, DEFAULT_MAC_ID);
     let allowed_losses =
         value::number_or(problems, &table.allowed_losses, "the number of allowed losses", 1..=100, 3);
     if table.drive.is_empty() {

@@ -172,7 +172,7 @@ pub enum Loss {
     #[error("no update period is known")]
     NoPeriod,
     /// The box ends.
-    #[error("the box ends")]
+    #[error("the gateway ends")]
     End,
 }
 

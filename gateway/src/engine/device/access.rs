@@ -21,8 +21,8 @@ use crate::engine::direct::DirectFailure;
 use crate::engine::notice::Notice;
 use crate::engine::parameter::{ParameterJob, ParameterJobs};
 use crate::mapping::{
-    self, AttributeEntry, AttributeTable, Backing, CipTables, Item, Mapping, MechanicalFact, Missing, Number,
-    ParameterEntry, SequenceAttributes,
+    self, AttributeEntry, AttributeTable, Backing, CipTables, Item, Mapping, MechanicalFact, Number,
+    ParameterEntry, ParameterPlace, SequenceAttributes,
 };
 
 /// Writes to the drive that may be under way for one axis.
@@ -121,28 +121,19 @@ impl Accesses {
         {
             return self.compute(access, &entry, parameter);
         }
-        let Some(held) = program.parameter(parameter) else {
-            if let Some(value) = program.datum(parameter) {
-                return on.compare_datum(access, &entry, value, notice);
-            }
-            match missing {
-                Missing::Device | Missing::DeviceOrZero if program.can_go_by(parameter) => {}
-                Missing::Zero | Missing::DeviceOrZero
-                    if program.has_parameters() && !program.is_own(parameter) =>
+        let held = match program.place(parameter, missing) {
+            ParameterPlace::Drive(held) => held,
+            ParameterPlace::Configuration(value) => return on.compare_datum(access, &entry, value, notice),
+            ParameterPlace::Zero => return on.compare_zero(access, &entry, notice),
+            ParameterPlace::Gateway | ParameterPlace::Stored => {
+                if let AccessOperation::Write(bytes) = &access.operation
+                    && stopping_torque::is_stopping_torque(&entry)
                 {
-                    return on.compare_zero(access, &entry, notice);
+                    return self.compare(on, access, bytes, &entry, buses);
                 }
-                Missing::Stored => {}
-                Missing::Absent | Missing::Zero | Missing::Device | Missing::DeviceOrZero => {
-                    return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED);
-                }
+                return on.keep(access);
             }
-            if let AccessOperation::Write(bytes) = &access.operation
-                && stopping_torque::is_stopping_torque(&entry)
-            {
-                return self.compare(on, access, bytes, &entry, buses);
-            }
-            return on.keep(access);
+            ParameterPlace::Absent => return Err(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED),
         };
         if held.to_drive.is_none() && entry.access != mapping::Access::Get {
             match (&access.operation, parameter.is_of_vendor()) {

@@ -95,7 +95,7 @@ impl CyclicValues {
         entries.filter(|entry| !self.admit(mapping, program, entry)).map(|entry| entry.id)
     }
 
-    /// Whether the drive lets an attribute be in a list, as far as that is for the drive to say.
+    /// Whether the drive lets an attribute be in a read list, as far as that is for the drive to say.
     fn admit(&mut self, mapping: &Mapping, program: &DriveProgram, entry: &AttributeEntry) -> bool {
         let parameter = match entry.backing {
             Backing::Signal { signal, otherwise: Some(_), .. } => {
@@ -117,6 +117,16 @@ impl CyclicValues {
             }
         }
         true
+    }
+
+    /// The attributes that a drive does not let be in write lists: nobody has them.
+    pub fn not_written<'a>(
+        mapping: &'a Mapping,
+        attributes: &'a AttributeTable,
+        program: &'a DriveProgram,
+    ) -> impl Iterator<Item = u16> + 'a {
+        let entries = attributes.entries().iter();
+        entries.filter(|entry| !mapping.has(entry, program)).map(|entry| entry.id)
     }
 
     /// Whether settings are still to be read that cyclic lists may need.

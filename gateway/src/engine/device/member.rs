@@ -12,6 +12,7 @@ use profile_generic::time_base::TimeBase;
 
 use super::access::{Accessed, Accesses};
 use super::axis::CipAxis;
+use super::cyclic_values::CyclicValues;
 use super::reactions;
 use super::scaling::{Scaling, signal_octets};
 use super::stopping::{Settings, StopDefaults, Stopping};
@@ -143,7 +144,9 @@ impl Member {
         if let Some(program) = axis.south().filter(|_| computed.is_outdated(axis)) {
             let attributes = self.scaling.attributes();
             let refused = computed.commission(mapping, attributes, (axis.programs(), program));
-            device.set_not_cyclic(place, refused);
+            device.set_not_cyclically_read(place, refused);
+            let refused = CyclicValues::not_written(mapping, attributes, program);
+            device.set_not_cyclically_written(place, refused);
         }
         let (settings, sequence) = self.stopping.settings(Settings {
             rows: &mapping.cip.sequence,

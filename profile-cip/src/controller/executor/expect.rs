@@ -4,7 +4,7 @@ use super::Context;
 use super::leaf::Run;
 use crate::controller::condition::{Condition, Found, Number};
 use crate::controller::failure::Failure;
-use crate::controller::program::Step;
+use crate::controller::program::{CyclicDirection, Step};
 use crate::controller::services::Outcome;
 use crate::wire::motion::EventNotification;
 use crate::wire::motion::attribute_list::AttributeSelector;
@@ -168,6 +168,13 @@ fn look(condition: &Condition, cx: &mut Context<'_>) -> Result<Option<Found>, Fa
             match cx.axis(*axis)?.lists.value(*attribute).map(|bytes| check.judge(bytes)) {
                 Some((_, true)) => None,
                 Some((found, false)) => Some(found.map_or(Found::Nothing, Found::Number)),
+                None => Some(Found::Nothing),
+            }
+        }
+        Condition::CyclicWriteStatus { axis, status } => {
+            match cx.axis(*axis)?.lists.status(CyclicDirection::Write) {
+                Some(found) if found == *status => None,
+                Some(found) => Some(Found::Number(Number::Integer(i64::from(found)))),
                 None => Some(Found::Nothing),
             }
         }

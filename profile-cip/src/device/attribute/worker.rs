@@ -199,17 +199,15 @@ impl AttributeWorker {
         Some(waiting.access.clone())
     }
 
-    /// Takes the drive's answer. Returns whether it belonged to this worker.
+    /// Takes the drive's answer. Returns the access if it was one of this worker's.
     pub fn complete(
         &mut self,
         ticket: u32,
         answer: Result<&[u8], GeneralStatus>,
         space: &mut AttributeSpace<'_>,
-    ) -> bool {
-        let Some(Waiting { item, access, .. }) = self.waiting.take_if(|w| w.access.ticket == ticket) else {
-            return false;
-        };
-        let Some(job) = self.job.as_mut() else { return true };
+    ) -> Option<AttributeAccess> {
+        let Waiting { item, access, .. } = self.waiting.take_if(|w| w.access.ticket == ticket)?;
+        let Some(job) = self.job.as_mut() else { return Some(access) };
         let entry = space.table.find(item.id);
         let part = Part { start: access.start, count: access.count };
         let outcome = match (&access.operation, answer) {
@@ -226,7 +224,7 @@ impl AttributeWorker {
             }
         };
         job.answer(&item, outcome, self.limit);
-        true
+        Some(access)
     }
 }
 
@@ -270,7 +268,7 @@ mod tests {
         fn complete(&mut self, ticket: u32, answer: Result<&[u8], GeneralStatus>) -> bool {
             let (table, store, tickets) = (&self.table, &mut self.store, &mut self.tickets);
             let mut space = AttributeSpace { table, store, instance: 3, running: false, tickets };
-            self.worker.complete(ticket, answer, &mut space)
+            self.worker.complete(ticket, answer, &mut space).is_some()
         }
     }
 

@@ -7,14 +7,17 @@
 //! The standard promises that what a list carries is read in every update and applied in the next one. Values stored in
 //! the device keep that promise, and so do signals and what is computed from them, which the owner of the device publishes in
 //! every cycle ([`CyclicLists::publish`]), as far as the drive has them ([`CyclicLists::set_refused`]). A parameter of the
-//! drive, which only the service channel reaches, cannot; it is refused with its own status ("attribute not gettable", "attribute not
-//! settable") instead of being served from a copy of unknown age. Neither can a string, whose length would move what stands behind it.
+//! drive, which only its own parameter channel reaches, is not read in a list: it is refused with its own status ("attribute not
+//! gettable") instead of being served from a copy of unknown age. It is written by one, as soon as the channel has time
+//! ([`DriveValues`]), because gains and limits are what controllers have write lists for. No list has a string, whose length would move
+//! what stands behind it.
 //!
 //! A trim ([`Entry::is_trim`]) is written by a list only. It goes with the set-points of its own update and is stored nowhere:
 //! an update that does not carry it means zero.
 
 use arrayvec::ArrayVec;
 
+use super::drive_values::DriveValues;
 use crate::device::attribute::{Access, AttributeStore, AttributeTable, Backing, DataType, Entry};
 use crate::device::axis::drive_link::Trims;
 use crate::wire::motion::id_list::{IdList, IdStatus, IdStatusList};
@@ -25,8 +28,8 @@ pub const CYCLIC_ATTRIBUTES_MAX: usize = 16;
 /// Most octets of cyclic read data.
 pub(crate) const CYCLIC_DATA_MAX: usize = 256;
 
-/// Most attributes that a drive does not let be in a list.
-const REFUSED_MAX: usize = 128;
+/// Most attributes that a drive does not let be in a list. One more would be refused when it is read or written.
+const REFUSED_MAX: usize = 256;
 
 /// Direction of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,7 +95,7 @@ impl CyclicLists {
             (Some(e), Direction::Write)
                 if !e.is_trim()
                     && (e.definition.access != Access::Set
-                        || e.definition.backing != Backing::Stored
+                        || !matches!(e.definition.backing, Backing::Stored | Backing::Drive)
                         || e.definition.data_type == DataType::ShortString) =>
             {
                 GeneralStatus::ATTRIBUTE_NOT_SETTABLE
@@ -119,8 +122,12 @@ impl CyclicLists {
         if list.len() > CYCLIC_ATTRIBUTES_MAX {
             return (GeneralStatus::RESOURCE_UNAVAILABLE, 0);
         }
+        let not_of_this_drive = match direction {
+            Direction::Write => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
+            Direction::Read => GeneralStatus::ATTRIBUTE_NOT_GETTABLE,
+        };
         let suits = |id| match Self::suits(table, id, direction) {
-            GeneralStatus::SUCCESS if self.refused.contains(&id) => GeneralStatus::ATTRIBUTE_NOT_GETTABLE,
+            GeneralStatus::SUCCESS if self.refused.contains(&id) => not_of_this_drive,
             status => status,
         };
         let statuses: ArrayVec<IdStatus, CYCLIC_ATTRIBUTES_MAX> =
@@ -145,23 +152,26 @@ impl CyclicLists {
             .map_or((GeneralStatus::REPLY_DATA_TOO_LARGE, 0), |len| (status, len))
     }
 
-    /// Applies cyclic write data, all of it or nothing, and gives the trims among them, which are not kept.
+    /// Applies cyclic write data, all of it or nothing, and gives the trims among them, which are not kept. What lives in the drive goes
+    /// into `drive`.
     ///
     /// # Errors
     /// There is no list with this ID, or the data do not fit it.
     pub fn write(
         &mut self,
         table: &AttributeTable,
-        store: &mut AttributeStore,
+        (store, drive): (&mut AttributeStore, &mut DriveValues),
         id: u8,
         data: &[u8],
         running: bool,
     ) -> Result<Trims, GeneralStatus> {
         let mut trims = Trims::default();
         if id == 0 {
+            drive.clear();
             return if data.is_empty() { Ok(trims) } else { Err(GeneralStatus::TOO_MUCH_DATA) };
         }
         let layout = self.take_up(id).ok_or(GeneralStatus::INVALID_PARAMETER)?;
+        drive.keep(&layout.attributes);
         for apply in [false, true] {
             let mut at = 0;
             for entry in layout.attributes.iter().filter_map(|id| table.find(*id)) {
@@ -181,6 +191,9 @@ impl CyclicLists {
                     (true, true) => {}
                     (false, false) => {
                         entry.check_set(entry.whole(), value, running).map_err(|(status, _)| status)?;
+                    }
+                    (true, false) if entry.definition.backing == Backing::Drive => {
+                        drive.want(entry.definition.id, value)?;
                     }
                     (true, false) => store.put(entry, entry.whole(), value)?,
                 }
@@ -245,6 +258,7 @@ impl CyclicLists {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::attribute::worker::AccessOperation;
     use crate::device::attribute::{AttributeDefinition, Scope};
 
     fn table() -> AttributeTable {
@@ -300,7 +314,10 @@ mod tests {
         let answer = configure(&mut lists, Direction::Write, &[1, 2, 3]);
         assert_eq!(answer, (GeneralStatus::SUCCESS, vec![3, 0, 1, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0]));
         let data = [1, 1, 1, 1, 2, 2, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0x80];
-        assert_eq!(lists.write(&table, &mut store, 1, &data, false), Ok(Trims::default()));
+        assert_eq!(
+            lists.write(&table, (&mut store, &mut DriveValues::default()), 1, &data, false),
+            Ok(Trims::default())
+        );
         assert_eq!(store.unsigned(&table, 2), Some(0x0202));
         assert_eq!(store.unsigned(&table, 3), Some(0x8000_0000_0000_0003));
         assert_eq!(lists.read(&table, &store, 1).as_deref(), Ok(&data[..]));
@@ -312,7 +329,9 @@ mod tests {
         let mut store = AttributeStore::new(&table);
         let mut lists = CyclicLists::default();
         configure(&mut lists, Direction::Write, &[1, 2]);
-        let mut write = |id, data: &[u8], running| lists.write(&table, &mut store, id, data, running);
+        let mut write = |id, data: &[u8], running| {
+            lists.write(&table, (&mut store, &mut DriveValues::default()), id, data, running)
+        };
         assert_eq!(write(1, &[1; 4], false), Err(GeneralStatus::NOT_ENOUGH_DATA));
         assert_eq!(write(1, &[1; 12], false), Err(GeneralStatus::TOO_MUCH_DATA));
         assert_eq!(write(2, &[1; 8], false), Err(GeneralStatus::INVALID_PARAMETER));
@@ -334,19 +353,28 @@ mod tests {
             let values = [position.to_le_bytes(), 7_u32.to_le_bytes(), torque.to_le_bytes()];
             values.concat()
         };
-        let trims = lists.write(&table, &mut store, 1, &data(-5, 2.5), false).expect("good data");
+        let trims = lists
+            .write(&table, (&mut store, &mut DriveValues::default()), 1, &data(-5, 2.5), false)
+            .expect("good data");
         assert_eq!(trims.iter().collect::<Vec<_>>(), [(18, -5.0), (19, 2.5)]);
         assert_eq!(store.unsigned(&table, 1), Some(7));
         assert_eq!((store.unsigned(&table, 18), store.unsigned(&table, 19)), (Some(0), Some(0)), "not kept");
-        let infinite = lists.write(&table, &mut store, 1, &data(1, f32::INFINITY), false);
+        let infinite =
+            lists.write(&table, (&mut store, &mut DriveValues::default()), 1, &data(1, f32::INFINITY), false);
         assert_eq!(infinite, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE));
         // Attribute 1 is not on the list of Table 5-2.110, the trims need not be.
-        let running = lists.write(&table, &mut store, 1, &data(1, 1.0), true);
+        let running = lists.write(&table, (&mut store, &mut DriveValues::default()), 1, &data(1, 1.0), true);
         assert_eq!(running, Err(GeneralStatus::OBJECT_STATE_CONFLICT));
         assert_eq!(configure(&mut lists, Direction::Write, &[19, 18, 19]).0, GeneralStatus::SUCCESS);
-        let trims = lists.write(&table, &mut store, 2, &data(0, 1.5), true).expect("trims while running");
+        let trims = lists
+            .write(&table, (&mut store, &mut DriveValues::default()), 2, &data(0, 1.5), true)
+            .expect("trims while running");
         assert_eq!(trims.iter().collect::<Vec<_>>(), [(19, 1.5), (18, 7.0)], "the last value of one counts");
-        assert_eq!(lists.write(&table, &mut store, 0, &[], true), Ok(Trims::default()), "none is zero");
+        assert_eq!(
+            lists.write(&table, (&mut store, &mut DriveValues::default()), 0, &[], true),
+            Ok(Trims::default()),
+            "none is zero"
+        );
     }
 
     #[test]
@@ -373,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn strings_and_parameters_of_the_drive_are_refused_by_name() {
+    fn strings_and_reads_of_parameters_of_the_drive_are_refused_by_name() {
         let mut lists = CyclicLists::default();
         let (status, body) = configure(&mut lists, Direction::Read, &[7, 5]);
         assert_eq!(
@@ -381,8 +409,35 @@ mod tests {
             (GeneralStatus::ATTRIBUTE_LIST_ERROR, &[7, 0, 0x2C, 0, 5, 0, 0x2C, 0][..])
         );
         let (status, body) = configure(&mut lists, Direction::Write, &[7, 5, 6]);
-        let refused = [7, 0, 0x0E, 0, 5, 0, 0x0E, 0, 6, 0, 0x0E, 0];
+        let refused = [7, 0, 0x0E, 0, 5, 0, 0, 0, 6, 0, 0x0E, 0];
         assert_eq!((status, &body[4..]), (GeneralStatus::ATTRIBUTE_LIST_ERROR, &refused[..]));
+        lists.set_refused([5].into_iter());
+        let (status, body) = configure(&mut lists, Direction::Write, &[5, 1]);
+        let refused = [5, 0, 0x0E, 0, 1, 0, 0, 0];
+        assert_eq!((status, &body[4..]), (GeneralStatus::ATTRIBUTE_LIST_ERROR, &refused[..]));
+    }
+
+    #[test]
+    fn what_lives_in_the_drive_goes_there_with_the_rest_or_not_at_all() {
+        let (table, mut drive, mut tickets) = (table(), DriveValues::default(), 0);
+        let mut store = AttributeStore::new(&table);
+        let mut lists = CyclicLists::default();
+        assert_eq!(configure(&mut lists, Direction::Write, &[1, 5]).0, GeneralStatus::SUCCESS);
+        let mut write = |drive: &mut DriveValues, id, data: &[u8]| {
+            lists.write(&table, (&mut store, drive), id, data, false).err()
+        };
+        let short = [1, 0, 0, 0, 2, 0, 0];
+        assert_eq!(write(&mut drive, 1, &short), Some(GeneralStatus::NOT_ENOUGH_DATA));
+        assert_eq!(drive.take_access(1, &mut tickets), None);
+        assert_eq!(write(&mut drive, 1, &[1, 0, 0, 0, 2, 0, 0, 0]), None);
+        let access = drive.take_access(1, &mut tickets).expect("an access");
+        let octets = [2, 0, 0, 0].into_iter().collect();
+        assert_eq!((access.id, access.operation), (5, AccessOperation::Write(octets)));
+        assert_eq!(write(&mut drive, 1, &[1, 0, 0, 0, 3, 0, 0, 0]), None);
+        assert_eq!(write(&mut drive, 0, &[]), None);
+        assert!(!drive.complete(access.ticket, GeneralStatus::SUCCESS), "the empty list wants nothing");
+        assert_eq!(drive.take_access(1, &mut tickets), None);
+        assert_eq!((store.unsigned(&table, 1), store.unsigned(&table, 5)), (Some(1), Some(0)));
     }
 
     #[test]

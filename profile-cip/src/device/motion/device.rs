@@ -18,9 +18,11 @@
 use arrayvec::ArrayVec;
 use profile_generic::time::{MonotonicTime, SystemTime};
 
+use super::cyclic_list::Direction;
 use super::engine::Engine;
 use super::explicit::ExplicitSide;
 use super::fixed::with_services_alone;
+use super::instances::Completed;
 use super::io_connection::{IoConnection, Mode};
 use super::io_counters::MotionCounters;
 use super::{indication, service};
@@ -371,9 +373,14 @@ impl MotionDevice {
         self.engine.instances.publish_signals(axis, value);
     }
 
-    /// Sets which attributes of an axis that are not in the device the drive does not let be in cyclic lists; up to 128.
-    pub fn set_not_cyclic(&mut self, axis: usize, ids: impl Iterator<Item = u16>) {
-        self.engine.instances.set_not_cyclic(axis, ids);
+    /// Sets which attributes of an axis that are not in the device the drive does not let be in cyclic read lists; up to 256.
+    pub fn set_not_cyclically_read(&mut self, axis: usize, ids: impl Iterator<Item = u16>) {
+        self.engine.instances.set_not_cyclic(axis, Direction::Read, ids);
+    }
+
+    /// The same for cyclic write lists.
+    pub fn set_not_cyclically_written(&mut self, axis: usize, ids: impl Iterator<Item = u16>) {
+        self.engine.instances.set_not_cyclic(axis, Direction::Write, ids);
     }
 
     /// How the controller sees the positions of an axis now.
@@ -413,8 +420,9 @@ impl MotionDevice {
     /// Answers to accesses that nobody waits for any more are ignored.
     pub fn complete_attribute(&mut self, ticket: u32, answer: Result<&[u8], GeneralStatus>) {
         match self.engine.instances.complete(ticket, answer) {
-            Some(instance) => service::run(&mut self.engine, instance),
-            None => self.explicit.complete(&mut self.engine, ticket, answer),
+            Completed::List => {}
+            Completed::Channel(instance) => service::run(&mut self.engine, instance),
+            Completed::Nobody => self.explicit.complete(&mut self.engine, ticket, answer),
         }
     }
 

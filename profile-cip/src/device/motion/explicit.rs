@@ -153,7 +153,9 @@ impl ExplicitSide {
     pub fn complete(&mut self, engine: &mut Engine, ticket: u32, answer: Result<&[u8], GeneralStatus>) {
         let Some(Current { instance, .. }) = self.current else { return };
         let service = engine.instances.service(instance);
-        if service.is_some_and(|(_, mut space)| self.worker.complete(ticket, answer, &mut space)) {
+        let access = service.and_then(|(_, mut space)| self.worker.complete(ticket, answer, &mut space));
+        if let Some(access) = access {
+            engine.instances.set_by_others(&access);
             // The requests behind it begin with the next poll, which knows the time.
             self.advance(engine);
         }

@@ -1,10 +1,11 @@
 //! The instances of the Motion Device Axis Object: the class, which is instance 0, and the axes, from 1.
 
+use super::cyclic_list::Direction;
 use super::device::DeviceConfig;
 use super::service_channel::ServiceChannel;
 use super::slot::Slot;
 use crate::device::attribute::class::{self, ClassFacts};
-use crate::device::attribute::worker::{AttributeAccess, AttributeSpace};
+use crate::device::attribute::worker::{AccessOperation, AttributeAccess, AttributeSpace};
 use crate::device::attribute::{AttributeStore, AttributeTable, Scope, TableError, id};
 use crate::device::axis::Context;
 use crate::device::axis::exception::ExceptionActions;
@@ -14,6 +15,16 @@ use crate::wire::status::GeneralStatus;
 struct Class {
     store: AttributeStore,
     service: ServiceChannel,
+}
+
+/// Who has waited for an answer of the drive.
+pub(super) enum Completed {
+    /// A cyclic write list.
+    List,
+    /// The service channel of this instance.
+    Channel(usize),
+    /// Neither.
+    Nobody,
 }
 
 /// Class and axes, with the tables of their attributes.
@@ -108,21 +119,45 @@ impl Instances {
         for slot in &mut self.slots {
             slot.axis.lose();
             slot.service.reset();
+            slot.drive_values.clear();
         }
     }
 
     /// The next access to an attribute that lives in a drive.
     pub fn take_access(&mut self) -> Option<AttributeAccess> {
-        let axes = self.slots.iter_mut().map(|slot| &mut slot.service.worker);
-        axes.chain([&mut self.class.service.worker]).find_map(|worker| worker.take_access())
+        let Self { slots, class, tickets, .. } = self;
+        for worker in slots.iter_mut().map(|slot| &mut slot.service.worker).chain([&mut class.service.worker])
+        {
+            if let Some(access) = worker.take_access() {
+                return Some(access);
+            }
+        }
+        let mut axes = (1..).zip(slots);
+        axes.find_map(|(instance, slot)| slot.drive_values.take_access(instance, tickets))
     }
 
-    /// Hands the drive's answer to the channel that waits for it. Returns the instance of that channel.
-    pub fn complete(&mut self, ticket: u32, answer: Result<&[u8], GeneralStatus>) -> Option<usize> {
-        (0..=self.slots.len()).find(|instance| {
-            let service = self.service(*instance);
-            service.is_some_and(|(channel, mut space)| channel.worker.complete(ticket, answer, &mut space))
-        })
+    /// A service has set an attribute that lives in the drive, and that a cyclic write list may have as well.
+    pub fn set_by_others(&mut self, access: &AttributeAccess) {
+        if let (AccessOperation::Write(_), Some((slot, _))) =
+            (&access.operation, self.axis(usize::from(access.instance)))
+        {
+            slot.drive_values.set_by_others(access.id);
+        }
+    }
+
+    /// Hands the drive's answer to the cyclic write list or the channel that waits for it. Returns the instance of that channel.
+    pub fn complete(&mut self, ticket: u32, answer: Result<&[u8], GeneralStatus>) -> Completed {
+        let status = answer.err().unwrap_or(GeneralStatus::SUCCESS);
+        if self.slots.iter_mut().any(|slot| slot.drive_values.complete(ticket, status)) {
+            return Completed::List;
+        }
+        let access = (0..=self.slots.len()).find_map(|instance| {
+            let (channel, mut space) = self.service(instance)?;
+            channel.worker.complete(ticket, answer, &mut space)
+        });
+        let Some(access) = access else { return Completed::Nobody };
+        self.set_by_others(&access);
+        Completed::Channel(usize::from(access.instance))
     }
 
     /// An attribute of the class as a number without sign.
@@ -177,10 +212,10 @@ impl Instances {
         slot.store.get(entry, entry.whole())
     }
 
-    /// Sets which attributes of an axis, which counts from 0, cannot be in cyclic lists.
-    pub fn set_not_cyclic(&mut self, axis: usize, ids: impl Iterator<Item = u16>) {
+    /// Sets which attributes of an axis, which counts from 0, cannot be in cyclic lists of a direction.
+    pub fn set_not_cyclic(&mut self, axis: usize, direction: Direction, ids: impl Iterator<Item = u16>) {
         if let Some(slot) = self.slots.get_mut(axis) {
-            slot.read_lists.set_refused(ids);
+            slot.lists(direction).set_refused(ids);
         }
     }
 

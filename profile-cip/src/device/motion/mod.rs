@@ -3,6 +3,7 @@
 mod clock;
 mod cyclic_list;
 pub mod device;
+mod drive_values;
 mod engine;
 mod explicit;
 mod fixed;

@@ -1,6 +1,7 @@
 //! An axis with its attributes, its service channel and its cyclic lists.
 
 use super::cyclic_list::{CyclicLists, Direction};
+use super::drive_values::DriveValues;
 use super::receive::Verdict;
 use super::service_channel::ServiceChannel;
 use crate::device::attribute::{AttributeStore, AttributeTable, id};
@@ -18,6 +19,8 @@ pub(super) struct Slot {
     pub service: ServiceChannel,
     pub write_lists: CyclicLists,
     pub read_lists: CyclicLists,
+    /// What the write list in use has for the drive.
+    pub drive_values: DriveValues,
 }
 
 impl Slot {
@@ -28,6 +31,7 @@ impl Slot {
             service: ServiceChannel::default(),
             write_lists: CyclicLists::default(),
             read_lists: CyclicLists::default(),
+            drive_values: DriveValues::default(),
         }
     }
 
@@ -37,6 +41,7 @@ impl Slot {
         self.service.reset();
         self.write_lists.start_over();
         self.read_lists.start_over();
+        self.drive_values.clear();
     }
 
     /// Whether its drive has or may have torque: until the drive reports otherwise.
@@ -78,9 +83,16 @@ impl Slot {
             Err(GeneralStatus::OBJECT_STATE_CONFLICT)
         } else {
             let running = self.axis.is_running();
-            self.write_lists.write(table, &mut self.store, block.write_block_id, block.data, running)
+            let values = (&mut self.store, &mut self.drive_values);
+            self.write_lists.write(table, values, block.write_block_id, block.data, running)
         };
-        let status = written.map(|written| *trims = written).err().unwrap_or(GeneralStatus::SUCCESS);
+        let status = match written {
+            Ok(written) => {
+                *trims = written;
+                self.drive_values.status()
+            }
+            Err(status) => status,
+        };
         (block.write_block_id, block.read_block_id, status)
     }
 
@@ -92,11 +104,15 @@ impl Slot {
         body: &[u8],
         response: &mut [u8],
     ) -> (GeneralStatus, usize) {
-        let lists = match direction {
+        self.lists(direction).configure(table, direction, body, response)
+    }
+
+    /// The lists of a direction.
+    pub fn lists(&mut self, direction: Direction) -> &mut CyclicLists {
+        match direction {
             Direction::Write => &mut self.write_lists,
             Direction::Read => &mut self.read_lists,
-        };
-        lists.configure(table, direction, body, response)
+        }
     }
 
     /// Puts the values of the axis into its attributes, so that a service or a cyclic list reads them. `fixed`: the

@@ -339,3 +339,58 @@ fn cyclic_lists_are_written_and_read_in_every_update() {
     let read = rig.frame().instances().find(|i| i.number == 1).and_then(|i| i.read).expect("a block");
     assert_eq!((read.write_block_id, read.write_status), (1, GeneralStatus::OBJECT_STATE_CONFLICT.0));
 }
+
+/// The status of the write block in the newest update of the device.
+fn write_status(rig: &mut Rig) -> u8 {
+    let frame = rig.frame();
+    frame.instances().find(|i| i.number == 1).and_then(|i| i.read).expect("a block").write_status
+}
+
+#[test]
+fn cyclic_write_data_reach_the_drive_and_its_refusal_the_controller() {
+    let mut rig = Rig::stopped();
+    let mut body = [0; 16];
+    let len = IdList::emit(&mut body, &[1316, 461]).expect("room");
+    rig.services[1] = Some((1, MotionService::SET_CYCLIC_WRITE_LIST, body[..len].to_vec()));
+    rig.cycle();
+    assert_eq!(rig.response(1).map(|r| r.1), Some(0));
+    rig.services[1] = None;
+    let data = |value: u32| [value.to_le_bytes(), 1.5_f32.to_le_bytes()].concat();
+    send_write(&mut rig, &data(7));
+    assert_eq!(write_status(&mut rig), 0);
+    let access = rig.device.poll_attribute_access().expect("an access");
+    let wanted = |value: u32| AccessOperation::Write(value.to_le_bytes().into_iter().collect());
+    assert_eq!((access.instance, access.id, &access.operation), (1, 1316, &wanted(7)));
+    send_write(&mut rig, &data(8));
+    send_write(&mut rig, &data(9));
+    assert_eq!(rig.device.poll_attribute_access(), None, "one at a time");
+    rig.device.complete_attribute(access.ticket, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE));
+    send_write(&mut rig, &data(9));
+    assert_eq!(write_status(&mut rig), 0, "nobody wants 7 any more");
+    let access = rig.device.poll_attribute_access().expect("the newest value");
+    assert_eq!(access.operation, wanted(9));
+    rig.device.complete_attribute(access.ticket, Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE));
+    for _ in 0..2 {
+        send_write(&mut rig, &data(9));
+        assert_eq!(write_status(&mut rig), GeneralStatus::INVALID_ATTRIBUTE_VALUE.0);
+        assert_eq!(rig.device.poll_attribute_access(), None, "it has said no");
+    }
+    send_write(&mut rig, &data(10));
+    let access = rig.device.poll_attribute_access().expect("another value");
+    rig.device.complete_attribute(access.ticket, Ok(&[]));
+    send_write(&mut rig, &data(10));
+    assert_eq!((write_status(&mut rig), rig.device.poll_attribute_access()), (0, None));
+    // A service sets the attribute to something else: the updates set it back.
+    let mut body = [0; 32];
+    let mut list = ListWriter::new(&mut body).expect("room");
+    list.value(&AttributeSelector::scalar(1316, 4), &3_u32.to_le_bytes()).expect("room");
+    let len = list.finish();
+    rig.services[1] = Some((2, MotionService::SET_AXIS_ATTRIBUTES_LIST, body[..len].to_vec()));
+    rig.cycle();
+    let access = rig.device.poll_attribute_access().expect("that of the service");
+    assert_eq!(access.operation, wanted(3));
+    assert_eq!(rig.device.poll_attribute_access(), None);
+    rig.device.complete_attribute(access.ticket, Ok(&[]));
+    let access = rig.device.poll_attribute_access().expect("that of the list");
+    assert_eq!(access.operation, wanted(10));
+}
