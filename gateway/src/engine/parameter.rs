@@ -2,7 +2,8 @@
 //!
 //! A parameter that the drive has takes one access to the drive. One that is computed takes a read for each operand that counts and
 //! that is in no telegram, one after the other, and a write for the operand that is written when it is set. Signals are taken in the
-//! cycle in which the last operand is known. Nothing is kept: every value is the drive's at that moment.
+//! cycle in which the last operand is known. What was written is read again where the drive lets it be read, because a drive may take
+//! a value and keep another. Nothing is kept here: every value is the drive's at that moment.
 
 use arrayvec::ArrayVec;
 use profile_generic::parameter::{Access as When, Parameter};
@@ -11,7 +12,7 @@ use profile_generic::state::Report;
 use super::access::{Access, AccessFailure, Refusal};
 use super::axis::AxisChannel;
 use super::bus::Answer;
-use crate::mapping::{Computation, DriveProgram, Fact, Known, Mapping, NoValue, READS_MAX};
+use crate::mapping::{Computation, DriveProgram, Fact, Item, Known, Mapping, NoValue, READS_MAX};
 
 /// Accesses under way at the same time, of one axis by a controller or of all axes by another north side.
 pub const JOBS_MAX: usize = 4;
@@ -34,6 +35,9 @@ pub enum ParameterFailure {
     /// The values of the drive give no result.
     #[error("{0}")]
     NoValue(NoValue),
+    /// The drive has taken the value, and says another one when it is asked.
+    #[error("the drive has taken the value and kept another one")]
+    NotKept,
     /// The drive refused for another reason, mostly that it is not the time for it.
     #[error("the drive refused the access")]
     Refused,
@@ -68,7 +72,22 @@ enum Asked {
     Value,
     /// To take a value.
     Write,
+    /// What it has made of it.
+    ReadBack,
 }
+
+/// What a drive has taken.
+#[derive(Debug, Clone)]
+struct Written {
+    parameter: Parameter,
+    item: Item,
+    bytes: ArrayVec<u8, 8>,
+    /// The drive has said that it has it.
+    is_taken: bool,
+}
+
+/// A thousandth is what a drive may round.
+const ROUNDING: u64 = 1_000;
 
 /// What comes next.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -91,6 +110,8 @@ pub struct ParameterJob {
     answers: [Option<i64>; READS_MAX],
     next: Asked,
     asked: Asked,
+    /// What the drive was sent, if it lets it be read.
+    written: Option<Written>,
     result: Option<Result<i64, ParameterFailure>>,
 }
 
@@ -99,7 +120,7 @@ impl ParameterJob {
     #[must_use]
     pub const fn new(parameter: Parameter, wanted: Option<i64>) -> Self {
         let (answers, next, asked) = ([None; READS_MAX], Asked::Nothing, Asked::Nothing);
-        Self { parameter, wanted, answers, next, asked, result: None }
+        Self { parameter, wanted, answers, next, asked, written: None, result: None }
     }
 
     /// What comes next.
@@ -111,6 +132,10 @@ impl ParameterJob {
             return Next::Wait;
         }
         let is_gone = axis.feedback().report == Report::Silent;
+        if let Some(written) = self.written.as_ref().filter(|written| written.is_taken && !is_gone) {
+            self.next = Asked::ReadBack;
+            return Next::Ask(Access::read(written.item));
+        }
         let refused = self.refused(mapping, axis);
         if let Some(failure) = refused.or(is_gone.then_some(ParameterFailure::Unanswered)) {
             self.fail(failure);
@@ -154,7 +179,7 @@ impl ParameterJob {
     /// Whether a value may have reached the drive.
     #[must_use]
     pub fn is_written(&self) -> bool {
-        self.asked == Asked::Write || self.result.is_some()
+        self.asked == Asked::Write || self.written.is_some() || self.result.is_some()
     }
 
     /// The next step of a computed value; the error is the result.
@@ -233,7 +258,11 @@ impl ParameterJob {
             return Err(Err(ParameterFailure::Value));
         }
         self.next = Asked::Write;
-        Ok(Access::write(held.item, &bytes[..len]))
+        let bytes: ArrayVec<u8, 8> = bytes.iter().take(len).copied().collect();
+        let access = Access::write(held.item, &bytes);
+        let written = Written { parameter, item: held.item, bytes, is_taken: false };
+        self.written = held.from_drive.is_some().then_some(written);
+        Ok(access)
     }
 
     /// The drive was asked what came next.
@@ -256,7 +285,16 @@ impl ParameterJob {
         let parameter = match asked {
             Asked::Nothing => return,
             Asked::Write => {
-                self.result = self.wanted.map(Ok);
+                match &mut self.written {
+                    Some(written) => written.is_taken = true,
+                    None => self.result = self.wanted.map(Ok),
+                }
+                return;
+            }
+            Asked::ReadBack => {
+                let is_kept = self.written.take().is_some_and(|written| written.is_kept(data, axis));
+                let wanted = self.wanted.ok_or(ParameterFailure::Absent);
+                self.result = Some(if is_kept { wanted } else { Err(ParameterFailure::NotKept) });
                 return;
             }
             Asked::Operand(_, parameter) => parameter,
@@ -274,6 +312,16 @@ impl ParameterJob {
             }
             _ => self.result = Some(Ok(value)),
         }
+    }
+}
+
+impl Written {
+    /// Whether the drive has kept the value, by what it says now.
+    fn is_kept(&self, data: &[u8], axis: &AxisChannel) -> bool {
+        let held = axis.south().and_then(|program| program.parameter(self.parameter));
+        let value = |bytes: &[u8]| held.and_then(|held| held.decode(bytes));
+        let is_near = |(sent, now): (i64, i64)| sent.abs_diff(now) <= sent.unsigned_abs() / ROUNDING;
+        self.bytes.as_slice() == data || value(&self.bytes).zip(value(data)).is_some_and(is_near)
     }
 }
 

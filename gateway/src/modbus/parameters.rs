@@ -132,7 +132,9 @@ fn exception(failure: RegisterFailure) -> ExceptionCode {
         RegisterFailure::Parameter(ParameterFailure::Busy | ParameterFailure::Torque) => {
             ExceptionCode::ServerDeviceBusy
         }
-        RegisterFailure::Parameter(ParameterFailure::Value) => ExceptionCode::IllegalDataValue,
+        RegisterFailure::Parameter(ParameterFailure::Value | ParameterFailure::NotKept) => {
+            ExceptionCode::IllegalDataValue
+        }
         RegisterFailure::Parameter(ParameterFailure::ReadOnly) => ExceptionCode::IllegalFunction,
         RegisterFailure::Parameter(_) => ExceptionCode::ServerDeviceFailure,
     }
@@ -267,6 +269,7 @@ mod tests {
     fn every_failure_has_its_exception() {
         let of = |failure: ParameterFailure| exception(failure.into());
         assert_eq!(of(ParameterFailure::Value), ExceptionCode::IllegalDataValue);
+        assert_eq!(of(ParameterFailure::NotKept), ExceptionCode::IllegalDataValue);
         assert_eq!(of(ParameterFailure::ReadOnly), ExceptionCode::IllegalFunction);
         assert_eq!(of(ParameterFailure::Torque), ExceptionCode::ServerDeviceBusy);
         for failure in [ParameterFailure::Absent, ParameterFailure::Unanswered, ParameterFailure::Refused] {

@@ -312,3 +312,55 @@ fn a_vendors_parameter_is_a_floating_point_number_in_a_canopen_drive() {
     assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(49.9)).0, INVALID_VALUE);
     assert_eq!(held(&mut rig), bits(333.3));
 }
+
+/// Runs until there is an answer. The drive makes something else of the first value that it is given.
+fn until_answered<T>(
+    rig: &mut Rig,
+    becomes: impl Fn(i64) -> i64,
+    mut answer: impl FnMut() -> Option<T>,
+) -> T {
+    let number = |rig: &Rig| rig.line.slaves()[0].store().number_of(idn());
+    let (before, mut is_done) = (number(rig), false);
+    for _ in 0..5_000 {
+        if let Some(answer) = answer() {
+            return answer;
+        }
+        rig.run_for(millis(1));
+        let now = number(rig);
+        if now != before && !is_done {
+            is_done = true;
+            rig.line.slaves_mut()[0].store_mut().set_number_of(idn(), becomes(now));
+        }
+    }
+    panic!("no answer: {}", rig.told());
+}
+
+#[test]
+fn a_drive_that_keeps_another_value_is_found_out_by_local_control_and_registers() {
+    let mut rig = Rig::new(Settings { overlays: vec![OVERLAY], ..Settings::default() });
+    let notch = Definition::value(idn(), NOTCH_WRITABLE, "Notch filter frequency", 1_200);
+    rig.line.slaves_mut()[0].store_mut().define(notch.unit("Hz").range(600, 15_000));
+    let (registers, mut register) = RegisterNorth::new();
+    rig.engine.set_registers(registers);
+    let (local, mut client) = LocalNorth::new(rig.engine.axes().len());
+    rig.engine.set_local(local);
+    rig.until_ready();
+    rig.run_for(millis(200));
+    // Half of the value; then one step of 1400, which a drive may round.
+    for (wanted, becomes, is_kept) in [(200_000, 1_000, false), (140_000, 1_399, true)] {
+        let request = RegisterRequest { id: 3, axis: 0, parameter: NOTCH_PARAMETER, wanted: Some(wanted) };
+        register.requests.push(request).expect("room");
+        let answer = until_answered(&mut rig, |_| becomes, || register.answers.pop().ok());
+        let not_kept = RegisterFailure::Parameter(ParameterFailure::NotKept);
+        assert_eq!(answer.result, if is_kept { Ok(wanted) } else { Err(not_kept) });
+        // Another value than the one that it has now.
+        let wanted = wanted + 20_000;
+        let parameter = NOTCH_PARAMETER;
+        let request = Request::Parameter { client: 1, id: 7, axis: 0, parameter, wanted: Some(wanted) };
+        client.requests.push(request).expect("room");
+        let becomes = if is_kept { 1_599 } else { 1_000 };
+        let answer = until_answered(&mut rig, |_| becomes, || client.answers.pop().ok());
+        let not_kept = Failure::Parameter(ParameterFailure::NotKept);
+        assert_eq!(answer.result, if is_kept { Ok(Some(wanted)) } else { Err(not_kept) });
+    }
+}

@@ -23,7 +23,7 @@ impl From<ParameterFailure> for GeneralStatus {
         match failure {
             ParameterFailure::Absent => GeneralStatus::ATTRIBUTE_NOT_SUPPORTED,
             ParameterFailure::ReadOnly => GeneralStatus::ATTRIBUTE_NOT_SETTABLE,
-            ParameterFailure::Value => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
+            ParameterFailure::Value | ParameterFailure::NotKept => GeneralStatus::INVALID_ATTRIBUTE_VALUE,
             ParameterFailure::NoValue(_)
             | ParameterFailure::Refused
             | ParameterFailure::Torque

@@ -218,6 +218,7 @@ impl Failure {
                 ParameterFailure::Value => "value",
                 ParameterFailure::Torque => "torque",
                 ParameterFailure::NoValue(_) => "no-value",
+                ParameterFailure::NotKept => "not-kept",
                 ParameterFailure::Refused => "refused",
                 ParameterFailure::Unanswered => "unanswered",
                 ParameterFailure::Busy => "busy",
