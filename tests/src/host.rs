@@ -5,7 +5,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError, RwLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -15,8 +15,9 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 /// watch sees less of a pause than the process that it hits.
 const PAUSE: Duration = Duration::from_millis(6);
 
-/// Held while a test of processes in real time runs: two of them disturb each other on a small host.
-static ALONE: Mutex<()> = Mutex::new(());
+/// Read while a test of processes in real time runs beside others, written while one runs alone: on a small host they may disturb
+/// each other.
+static BESIDE: RwLock<()> = RwLock::new(());
 
 /// Runs of a test on a host that pauses in each of them.
 const ATTEMPTS: u32 = 6;
@@ -81,22 +82,39 @@ fn longest_pause(stop: &AtomicBool) -> Duration {
     longest
 }
 
+/// Says past the test harness's capture why a test runs again.
+fn again(test: &str, why: &str) {
+    use std::io::Write as _;
+    let _ = writeln!(std::io::stderr(), "AGAIN {test}: {why}");
+}
+
+/// Runs a test of processes in real time beside others of this program. If it fails it runs again, as one
+/// [alone](alone_in_real_time).
+///
+/// # Panics
+/// As `run` does.
+pub fn in_real_time(test: &str, run: impl Fn()) {
+    let beside = BESIDE.read().unwrap_or_else(PoisonError::into_inner);
+    let is_good = catch_unwind(AssertUnwindSafe(&run)).is_ok();
+    drop(beside);
+    if !is_good {
+        again(test, "it failed beside another test");
+        alone_in_real_time(test, run);
+    }
+}
+
 /// Runs a test of processes in real time, alone among those of this program, and again (six runs at most) when it failed while
 /// the host paused for 6 ms or more.
 ///
 /// # Panics
 /// As `run` does.
-pub fn in_real_time(test: &str, run: impl Fn()) {
-    let tell = |paused: Duration| {
-        // Past the test harness's capture.
-        use std::io::Write as _;
-        let _ = writeln!(std::io::stderr(), "AGAIN {test}: the host paused for {paused:?} meanwhile");
-    };
+pub fn alone_in_real_time(test: &str, run: impl Fn()) {
+    let tell = |paused: Duration| again(test, &format!("the host paused for {paused:?} meanwhile"));
     let watch = || {
         let watch = Watch::start();
         || watch.longest_pause()
     };
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _alone = BESIDE.write().unwrap_or_else(PoisonError::into_inner);
     watched(run, watch, tell);
 }
 
@@ -141,6 +159,21 @@ mod tests {
             (1, true),
             "where the host kept time it counts at once"
         );
+    }
+
+    #[test]
+    fn what_fails_beside_others_runs_again_alone_and_its_failure_there_counts() {
+        for (failures, runs_expected, fails) in [(0, 1, false), (1, 2, false)] {
+            let runs = Cell::new(0);
+            let run = || {
+                runs.set(runs.get() + 1);
+                assert!(runs.get() > failures, "on purpose");
+            };
+            let result = catch_unwind(AssertUnwindSafe(|| in_real_time("on purpose", run)));
+            assert_eq!((runs.get(), result.is_err()), (runs_expected, fails));
+        }
+        let result = catch_unwind(|| in_real_time("on purpose", || panic!("on purpose")));
+        assert!(result.is_err());
     }
 
     #[test]

@@ -365,9 +365,12 @@ enum AssemblyFormat {
 /// Arguments of `attributes`.
 #[derive(Debug, Args)]
 struct AttributesArguments {
-    /// The configuration of the gateway (TOML).
-    #[arg(long, value_name = "FILE")]
-    config: PathBuf,
+    /// The configuration of the gateway (TOML): what is so with simulated drives of its kinds, or with `--values`.
+    #[arg(long, value_name = "FILE", required_unless_present = "local")]
+    config: Option<PathBuf>,
+    /// The Unix socket of the running gateway (`run --local`): what is so with the drives that it has commissioned.
+    #[arg(long, value_name = "SOCKET", num_args = 0..=1, default_missing_value = "/run/axisbridge/local", conflicts_with_all = ["config", "values"])]
+    local: Option<PathBuf>,
     /// Only the axis with this name.
     #[arg(long, value_name = "NAME")]
     axis: Option<String>,

@@ -35,11 +35,13 @@ pub mod notice;
 pub mod parameter;
 pub mod phase_lock;
 pub mod port;
+pub mod programs;
 mod publication;
 pub mod registers;
 mod schedule;
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use profile_cip::device::motion_device::{SyncQuality, SyncState};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
@@ -61,6 +63,7 @@ use self::north::{Exchange, North};
 use self::notice::Notice;
 use self::phase_lock::PhaseLock;
 use self::port::{NorthPort, SouthPort};
+use self::programs::{Programs, ProgramsOfDrives};
 use self::publication::{Publication, Sources};
 use self::registers::RegisterNorth;
 pub use self::schedule::BUSES_MAX;
@@ -75,7 +78,7 @@ type Due = [Option<MonotonicTime>; BUSES_MAX];
 /// The engine of one box. It owns buses, devices and axes; only the cycle thread uses it.
 #[derive(Debug)]
 pub struct Engine {
-    mapping: Mapping,
+    mapping: Arc<Mapping>,
     buses: Buses,
     devices: Vec<DeviceChannel>,
     assemblies: Vec<AssemblyChannel>,
@@ -92,6 +95,7 @@ pub struct Engine {
     clock: Clock,
     changes: Changes,
     publication: Publication,
+    programs: ProgramsOfDrives,
     ending: Ending,
 }
 
@@ -129,7 +133,8 @@ impl Engine {
             clock: Clock::default(),
             changes: Changes::new(&axes),
             ending: Ending::new(axes.len()),
-            mapping,
+            mapping: Arc::new(mapping),
+            programs: ProgramsOfDrives::new(axes.len()),
             buses,
             devices,
             assemblies,
@@ -160,6 +165,18 @@ impl Engine {
     #[must_use]
     pub fn mapping(&self) -> &Mapping {
         &self.mapping
+    }
+
+    /// The same, to be kept.
+    #[must_use]
+    pub fn shared_mapping(&self) -> Arc<Mapping> {
+        Arc::clone(&self.mapping)
+    }
+
+    /// The programs of the drives, for readers outside of the cycle.
+    #[must_use]
+    pub fn programs(&self) -> Programs {
+        self.programs.reader()
     }
 
     /// The axes in the order of the configuration.
@@ -316,6 +333,7 @@ impl Engine {
         if self.ending.advance(now, self.clock.base.system_at(now), &mut self.axes) {
             self.buses.iter_mut().for_each(|bus| bus.stop(now));
         }
+        self.programs.publish(&self.axes);
         let notices = &mut self.notices;
         let changed = self.changes.report(now, &self.axes, &mut |notice| push(notices, notice));
         let Self { buses, devices, assemblies, axes, changes, ending, publication, .. } = self;

@@ -80,6 +80,11 @@ pub enum Request {
         /// Position of the axis in the configuration, from 0; all axes without it.
         axis: Option<usize>,
     },
+    /// List the attributes of an axis, by what its drive has.
+    Attributes {
+        /// Position of the axis in the configuration, from 0.
+        axis: usize,
+    },
     /// List the first contacts.
     Contacts,
     /// Send a file.
@@ -142,7 +147,7 @@ impl FileRequest {
 pub enum BadRequest {
     /// The first word is none of the protocol's.
     #[error(
-        "unknown word `{0}`: expected box, axes, status, log, faults, contacts, contact, record, bundle, enable, disable, stop, reset, jog, move, home, parameters, list, read, write or command"
+        "unknown word `{0}`: expected box, axes, status, log, faults, attributes, contacts, contact, record, bundle, enable, disable, stop, reset, jog, move, home, parameters, list, read, write or command"
     )]
     Word(String),
     /// The word needs an axis.
@@ -243,6 +248,7 @@ pub fn parse(line: &str, axes: &[String], parameters: &[NamedParameter]) -> Resu
                 axis: name.map(|name| axis("faults", &mut std::iter::once(name), axes)).transpose()?,
             }
         }
+        "attributes" => Request::Attributes { axis: axis("attributes", &mut words, axes)? },
         "contacts" => Request::Contacts,
         "contact" => Request::File(FileRequest::Contact(contact_query(&mut words)?)),
         "record" => Request::File(FileRequest::Recording(recording_query(&mut words)?)),
@@ -730,6 +736,7 @@ mod tests {
         assert_eq!(parse("  status\ty-2 ", &axes), Ok(Request::Status { axis: 1 }));
         assert_eq!(parse("parameters", &axes), Ok(Request::Parameters));
         assert_eq!(parse("contacts", &axes), Ok(Request::Contacts));
+        assert_eq!(parse("attributes y", &axes), Ok(Request::Attributes { axis: 1 }));
         for (line, wanted) in [
             ("record", FileRequest::Recording(None)),
             ("record last=30", FileRequest::Recording(Some(DurationNs::from_secs(30)))),

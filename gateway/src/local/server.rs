@@ -20,6 +20,7 @@ use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::mpsc;
 use tracing::{info, warn};
 
+use super::attributes::Attributes;
 use super::drive::job::{Ask, Context, Job, Step};
 use super::protocol::{self, BadRequest, FileRequest, LINE_MAX, NamedParameter};
 use crate::bundle::Sources;
@@ -57,6 +58,8 @@ pub struct Shared {
     pub parameters: Vec<NamedParameter>,
     /// What is known of the drives.
     pub catalogue: Catalogue,
+    /// What success means for each attribute.
+    pub attributes: Attributes,
     /// How many lines clients can have written into the log.
     pub limit: Arc<LineLimit>,
     /// The gateway itself.
@@ -420,6 +423,7 @@ impl Client {
             protocol::Request::Parameters => Err(protocol::parameter_list(parameters)),
             protocol::Request::Log(query) => Err(self.shared.log(&query)),
             protocol::Request::Faults { axis } => Err(self.shared.faults(axis)),
+            protocol::Request::Attributes { axis } => Err(self.shared.attributes.reply(axis, &names[axis])),
             protocol::Request::Contacts => Err(self.shared.contacts()),
             // Its reply is not a text: see `send_file`.
             protocol::Request::File(_) => Err(String::new()),
@@ -654,6 +658,7 @@ mod tests {
                 vec![Bus::Sercos, Bus::Devicenet { attributes: Vec::new() }],
                 &Mapping::embedded().unwrap(),
             ),
+            attributes: Attributes::of_nobody(2),
             limit: Arc::default(),
             sources: Arc::new(Sources { status, installation, time, ..crate::bundle::tests::sources() }),
         }
@@ -795,8 +800,10 @@ mod tests {
     async fn files_are_sent_with_their_length_between_other_replies() {
         let bench = Bench::start("files");
         let mut client = bench.connect().await;
-        say(&mut client, "contacts\nrecord last=5\ncontact number=3\nbundle\naxes\n").await;
+        say(&mut client, "contacts\nattributes y\nrecord last=5\ncontact number=3\nbundle\naxes\n").await;
         assert_eq!(hear(&mut client).await, "ok contacts 0\n");
+        let nobodys = "error attributes y no-attributes: no CIP Motion device has the axis\n";
+        assert_eq!(hear(&mut client).await, nobodys);
         let file = async |client: &mut BufReader<UnixStream>, word: &str| {
             let head = hear(client).await;
             let length = head.strip_prefix(&format!("ok {word} bytes=")).expect(&head).trim_end();

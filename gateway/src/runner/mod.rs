@@ -53,6 +53,7 @@ use crate::host::HostPort;
 use crate::http::{self, Fixed, HttpServer, RunningServer, Sheets, View};
 use crate::latest::Reader;
 use crate::line_limit::LineLimit;
+use crate::local::attributes::Attributes;
 use crate::local::installation::Installation;
 use crate::local::protocol::NamedParameter;
 use crate::local::{LocalServer, Shared, SocketFile};
@@ -399,6 +400,7 @@ pub fn start(
                 names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
                 parameters: NamedParameter::of(engine.mapping()),
                 catalogue: Catalogue::of(config, engine.mapping()),
+                attributes: Attributes::of(config, &engine),
                 limit: Arc::clone(&limit),
                 sources: Arc::clone(&sources),
             };

@@ -9,7 +9,7 @@ use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use axisbridge_tests::host::in_real_time;
+use axisbridge_tests::host::alone_in_real_time;
 use axisbridge_tests::peer;
 use axisbridge_tests::rig::network::Random;
 use profile_cip::wire::cpf::{CommonPacket, EncapsulatedPacket, Item, ItemType};
@@ -337,7 +337,7 @@ fn attacks_on_every_port_cost_moving_axes_nothing() {
         return;
     }
     let _alone = one_bus();
-    in_real_time(name, || attacked(name));
+    alone_in_real_time(name, || attacked(name));
 }
 
 fn attacked(name: &str) {

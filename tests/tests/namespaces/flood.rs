@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use axisbridge_tests::host::in_real_time;
+use axisbridge_tests::host::alone_in_real_time;
 use axisbridge_tests::modbus::counters;
 use axisbridge_tests::namespace::{Namespace, cable};
 use axisbridge_tests::peer;
@@ -213,7 +213,7 @@ fn a_flood_of_a_stranger_costs_moving_axes_nothing() {
         return;
     }
     let _alone = one_bus();
-    in_real_time(name, || flooded(name));
+    alone_in_real_time(name, || flooded(name));
 }
 
 fn flooded(name: &str) {

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use axisbridge_tests::host::in_real_time;
+use axisbridge_tests::host::{alone_in_real_time, in_real_time};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::axisbridge;
 use serde_json::{Value, json};
@@ -243,7 +243,7 @@ fn fault_of_a_drive_has_one_name_in_status_metrics_and_page_stream() {
 
 #[test]
 fn two_hundred_connections_leave_the_gateway_working() {
-    in_real_time("two_hundred_connections_leave_the_gateway_working", || {
+    alone_in_real_time("two_hundred_connections_leave_the_gateway_working", || {
         let mut gateway = Gateway::with("http-flood", &configuration("127.0.0.89"));
         let address = address(&gateway);
         until(address, "/readyz", |code, _| code == 200);

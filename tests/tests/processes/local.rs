@@ -86,6 +86,29 @@ impl Gateway {
         assert!(errors.starts_with("no gateway answers at "), "{errors}");
     }
 
+    /// `axisbridge attributes` says of the commissioned drives what it says of those of the configuration, which are the same here.
+    fn shows_its_attributes(&self, name: &str) {
+        let attributes = |words: &[&str], path: &PathBuf| {
+            let mut command = Command::new(axisbridge());
+            command.arg("attributes").args(words).arg(path).stdin(Stdio::null());
+            let output = command.output().expect("the command can be started");
+            let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+            (output.status.code(), text(output.stdout), text(output.stderr))
+        };
+        let (code, of_gateway, errors) = attributes(&["--local"], &self.socket);
+        assert_eq!((code, errors.as_str()), (Some(0), ""), "{of_gateway}");
+        let (_, of_configuration, _) = attributes(&["--config"], &path(&format!("{name}.toml")));
+        let of_configuration = of_configuration.replace(" (a simulated one)", "");
+        let both = of_gateway.lines().zip(of_configuration.lines());
+        let differing: Vec<_> = both.filter(|(gateway, configuration)| gateway != configuration).collect();
+        assert!(differing.is_empty(), "{differing:?}");
+        let lines = [&of_gateway, &of_configuration].map(|text| text.lines().count());
+        assert_eq!(lines, [2 * 453 + 1; 2]);
+        let (code, _, errors) = attributes(&["--axis", "nobody", "--local"], &self.socket);
+        let expected = "error: there is no axis `nobody`; expected one of: turntable, slide\n";
+        assert_eq!((code, errors.as_str()), (Some(2), expected));
+    }
+
     pub fn connect(&self) -> Client {
         let end = Instant::now() + Duration::from_secs(30);
         loop {
@@ -152,6 +175,7 @@ fn people_move_an_axis_home_it_and_leave_it() {
         let reply = client.ask("move turntable -0.5 velocity=2 acceleration=5 by=drive");
         assert!((value(&reply, "position=") + 0.5).abs() < 0.002, "{reply}");
         gateway.shows_its_status();
+        gateway.shows_its_attributes("local-people");
         let reply = client.ask("home slide");
         assert!(reply.starts_with("error home slide not-enabled: "), "{reply}");
         // Nothing switches the home switch of this simulated drive: it seeks until a stop replaces the order.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
-use axisbridge_tests::host::in_real_time;
+use axisbridge_tests::host::alone_in_real_time;
 
 use super::local::Gateway;
 
@@ -47,7 +47,7 @@ fn configuration() -> String {
 
 #[test]
 fn sixty_four_axes_take_52_mb_at_most() {
-    in_real_time("sixty_four_axes_take_52_mb_at_most", || {
+    alone_in_real_time("sixty_four_axes_take_52_mb_at_most", || {
         let began = Instant::now();
         let mut gateway = Gateway::with("size", &configuration());
         let mut client = gateway.connect();

@@ -414,3 +414,28 @@ fn page(
     }
     page
 }
+
+/// What is said of the drives of a running gateway follows them: nothing before they are commissioned and while they are gone.
+#[test]
+fn the_programs_of_the_drives_can_be_read_while_they_are_commissioned() {
+    let mapping = Mapping::embedded().expect("the shipped tables are sound");
+    for (settings, truth) in [
+        (Settings::default(), Truth::Live),
+        (Settings::without_line(include_str!("can.toml").to_owned()), Truth::Absent),
+    ] {
+        let stage = rehearse(&mapping, &settings);
+        let mut rig = Rig::new(settings);
+        let programs = rig.engine.programs();
+        assert!(programs.get(0).is_none() && programs.get(9).is_none());
+        rig.until_ready();
+        let program = programs.get(0).expect("it is commissioned");
+        let kpp = stage.mapping.truths(&stage.axes[0].attributes, &program);
+        let kpp = kpp.iter().find(|row| row.id == 441).expect("Kpp");
+        assert_eq!(kpp.truth, truth, "{}", kpp.by);
+        rig.cable = false;
+        rig.run_for(millis(3_000));
+        if truth == Truth::Live {
+            assert!(programs.get(0).is_none(), "the line is gone");
+        }
+    }
+}
