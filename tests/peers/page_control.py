@@ -1,12 +1,15 @@
 """Controls an axis from the page of a gateway in headless Chromium: logs in, jogs, moves, stops, and closes the page while it jogs.
 
-    page_control.py CHROMIUM URL FOLDER TOKEN
+    page_control.py CHROMIUM URL FOLDER TOKEN CERTIFICATE
+
+The browser does not know the certificate of the gateway, and is made to accept it.
 
 Prints one JSON object: for each kind of jog the highest speed, how long the axis took to rest after the end, and its speed a second later.
 Screenshots go to FOLDER.
 """
 
 import json
+import ssl
 import sys
 import tempfile
 import time
@@ -21,7 +24,8 @@ JOG = "document.getElementById('{}')"
 
 def axis(url):
     """The first axis as the gateway reads its drive."""
-    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    trust = urllib.request.HTTPSHandler(context=ssl.create_default_context(cafile=sys.argv[5]))
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}), trust)
     with opener.open(f"{url}api/v1/status", timeout=20) as answer:
         return json.load(answer)["axes"][0]
 
@@ -79,7 +83,7 @@ def pictures(browser, folder):
     for scheme in ("light", "dark"):
         for size in ("desk", "phone"):
             browser.look(scheme, size)
-            browser.value("window.scrollTo(0, 0)")
+            browser.value("document.getElementById('axis-control').closest('section').scrollIntoView()")
             time.sleep(0.3)
             browser.picture(folder / f"control-{scheme}-{size}.png")
     wide = browser.value("document.documentElement.scrollWidth > document.documentElement.clientWidth + 1")
@@ -93,7 +97,7 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     report = {}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        browser = Browser(chromium, profile)
+        browser = Browser(chromium, profile, ["--ignore-certificate-errors"])
         try:
             target = browser.call("Target.createTarget", url="about:blank")["targetId"]
             browser.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]

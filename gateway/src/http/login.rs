@@ -61,7 +61,7 @@ impl Gate {
 
 /// Where the request of a connection comes from.
 #[derive(Debug, Clone, Copy)]
-pub struct From(pub SocketAddr);
+pub struct Remote(pub SocketAddr);
 
 /// Whether axes can be controlled over HTTP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -136,7 +136,7 @@ pub(super) fn refuse(code: StatusCode, text: impl std::fmt::Display) -> Response
 /// There is none, or the request is from another site.
 pub(super) fn enter<'s>(
     sources: &'s Sources,
-    from: From,
+    from: Remote,
     headers: &HeaderMap,
 ) -> Result<&'s Gate, Box<Response>> {
     let Some(gate) = &sources.gate else {
@@ -164,7 +164,7 @@ async fn offer(State(sources): State<Sources>) -> Response {
 
 async fn open(
     State(sources): State<Sources>,
-    Extension(from): Extension<From>,
+    Extension(from): Extension<Remote>,
     headers: HeaderMap,
 ) -> Response {
     let gate = match enter(&sources, from, &headers) {
@@ -179,7 +179,7 @@ async fn open(
         ([(RETRY_AFTER, seconds.to_string())], refuse(code, text)).into_response()
     };
     // Ahead of the attempt: a host does not lose one to another host that verifies.
-    let Ok(_verifies) = Arc::clone(&gate.verifying).try_acquire_owned() else {
+    let Ok(verifies) = Arc::clone(&gate.verifying).try_acquire_owned() else {
         return later(StatusCode::SERVICE_UNAVAILABLE, BUSY, "another token is being verified".to_owned());
     };
     if let Err(wait) = gate.attempts.take(Instant::now(), host) {
@@ -191,8 +191,14 @@ async fn open(
         return later(StatusCode::TOO_MANY_REQUESTS, seconds, text);
     }
     let token = Arc::clone(&gate.token);
-    // The thread has the nice value of this one: it takes what time the cycle leaves.
-    if !tokio::task::spawn_blocking(move || token.accepts(&secret)).await.unwrap_or(false) {
+    // The thread has the nice value of this one: it takes what time the cycle leaves. A client that goes meanwhile does not let the next
+    // one verify beside it.
+    let verify = move || {
+        let accepted = token.accepts(&secret);
+        drop(verifies);
+        accepted
+    };
+    if !tokio::task::spawn_blocking(verify).await.unwrap_or(false) {
         if gate.admits_line(from.0) {
             tracing::warn!(from = %from.0, "HTTP control refused: the token is wrong");
         }
@@ -211,7 +217,7 @@ async fn open(
 
 async fn close(
     State(sources): State<Sources>,
-    Extension(from): Extension<From>,
+    Extension(from): Extension<Remote>,
     headers: HeaderMap,
 ) -> Response {
     let gate = match enter(&sources, from, &headers) {

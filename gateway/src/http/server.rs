@@ -22,7 +22,7 @@ use tokio_rustls::TlsAcceptor;
 use super::access::Token;
 use super::events::Events;
 use super::limits::{HEADER_TIME_OUT, Peer, STALL_TIME_OUT, builder};
-use super::login::{From, Gate};
+use super::login::{Gate, Remote};
 use super::routes::{Sources, routes};
 use super::view::View;
 use crate::line_limit::{LineKind, LineLimit, Peer as LinePeer};
@@ -218,7 +218,7 @@ impl HttpServer {
             let stream = Peer::new(stream, self.stall_time_out, place);
             let connection = Connection {
                 router: router.clone(),
-                from: From(peer),
+                from: Remote(peer),
                 header_time_out: self.header_time_out,
             };
             match tls.clone() {
@@ -232,7 +232,7 @@ impl HttpServer {
 /// A connection that was accepted.
 struct Connection {
     router: Router,
-    from: From,
+    from: Remote,
     header_time_out: Duration,
 }
 
@@ -259,7 +259,7 @@ impl Connection {
 /// The router, with the host that asks in each request.
 struct Named {
     inner: TowerToHyperService<Router>,
-    from: From,
+    from: Remote,
 }
 
 impl Service<Request<Incoming>> for Named {

@@ -43,6 +43,12 @@ fn token(name: &str) -> (String, PathBuf) {
     (token, file)
 }
 
+/// Keys of `[http]` for TLS and this token.
+fn tls_keys(token: &Path, key: &Path) -> String {
+    let (token, good, key) = (token.display(), certificate("test-certificate.pem"), key.display());
+    format!("token = \"{token}\"\ncertificate = \"{}\"\nkey = \"{key}\"", good.display())
+}
+
 /// The configuration with more keys of `[http]`.
 fn with_keys(device: &str, keys: &str) -> String {
     configuration(device).replacen("[http]\n", &format!("[http]\n{keys}\n"), 1)
@@ -341,10 +347,7 @@ fn server_speaks_tls_to_clients_of_others() {
     in_real_time("server_speaks_tls_to_clients_of_others", || {
         let (token, file) = token("http-tls");
         let (good, key) = (certificate("test-certificate.pem"), certificate("test-key.pem"));
-        let keys = |key: &Path| {
-            let (file, good, key) = (file.display(), good.display(), key.display());
-            format!("token = \"{file}\"\ncertificate = \"{good}\"\nkey = \"{key}\"")
-        };
+        let keys = |key: &Path| tls_keys(&file, key);
         let mut gateway = Gateway::with("http-tls", &with_keys("127.0.2.100", &keys(&key)));
         let address = address_of(&gateway, "HTTPS");
         assert_eq!(ask(address, "GET", "/healthz").0, 0, "plain HTTP has no answer");
@@ -420,18 +423,19 @@ fn page_jogs_while_the_button_is_held_and_stops_when_it_closes() {
     let Some(python) = peer::python_or_skip("control in a browser", "json") else { return };
     in_real_time("page_jogs_while_the_button_is_held_and_stops_when_it_closes", || {
         let (token, file) = token("http-page");
-        let keys = format!("token = \"{}\"", file.display());
+        let keys = tls_keys(&file, &certificate("test-key.pem"));
         let mut gateway = Gateway::with("http-page", &with_keys("127.0.2.101", &keys));
-        let address = address(&gateway);
-        until(address, "/readyz", |code, _| code == 200);
+        let address = address_of(&gateway, "HTTPS");
+        gateway.connect().until("status turntable", "ok status turntable state=inhibited ");
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers/page_control.py");
         let mut browser = Command::new(&python);
         browser
             .arg(script)
             .arg(&chromium)
-            .arg(format!("http://{address}/"))
+            .arg(format!("https://localhost:{}/", address.port()))
             .arg(path("control-pictures"))
-            .arg(&token);
+            .arg(&token)
+            .arg(certificate("test-certificate.pem"));
         let output = browser.stdin(Stdio::null()).output().expect("python starts");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let report: Value = serde_json::from_slice(&output.stdout).expect("one object");

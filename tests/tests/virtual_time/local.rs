@@ -160,6 +160,17 @@ fn a_jog_ends_by_itself_when_nobody_repeats_it() {
     bench.run_for(160);
     assert!(bench.speed(TURNTABLE).abs() < NANO / 50, "{}", bench.speed(TURNTABLE));
     assert_eq!(bench.state(TURNTABLE), DriveState::Operating, "with torque");
+    // One that is for a shorter time brakes sooner.
+    let short = Jog {
+        velocity: Velocity(2 * NANO),
+        acceleration: Some(Acceleration(50 * NANO)),
+        time: DurationNs::from_millis(200),
+    };
+    bench.order(TURNTABLE, Order::Jog(short)).unwrap();
+    bench.run_for(180);
+    assert!(bench.speed(TURNTABLE) > 19 * NANO / 10, "{}", bench.speed(TURNTABLE));
+    bench.run_for(80);
+    assert!(bench.speed(TURNTABLE).abs() < NANO / 50, "{}", bench.speed(TURNTABLE));
     // The other way at once, and to rest by a stop.
     bench.order(TURNTABLE, jog(3 * NANO)).unwrap();
     bench.run_for(200);

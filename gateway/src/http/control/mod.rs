@@ -29,7 +29,7 @@ use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout, t
 
 use self::beats::{Age, Beats};
 use super::access::Lease;
-use super::login::{From, bearer, enter, refuse, unknown};
+use super::login::{Remote, bearer, enter, refuse, unknown};
 use super::routes::Sources;
 use crate::engine::local::Order;
 use crate::local::protocol::{BadRequest, LINE_MAX, Request};
@@ -82,7 +82,7 @@ pub(super) fn describe() -> Value {
 /// Begins a stream.
 pub(super) async fn control(
     State(sources): State<Sources>,
-    Extension(from): Extension<From>,
+    Extension(from): Extension<Remote>,
     headers: HeaderMap,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Response {

@@ -44,12 +44,14 @@ function buildControl(node, axis) {
     logIn(secret);
   });
   const parts = node.appendChild(element('div'));
+  const caution = parts.appendChild(element('p', 'says waits',
+    'Nobody may be in the danger zone. This is not a safety function: the axis stops when you release a button, leave the page or lose the network.'));
   const session = row(parts);
   const take = button(session, 'Take control', '', () => takeControl());
   take.id = 'take-control';
   const back = button(session, 'Give back', '', () => giveBack('Control was given back: the axis stops and loses its torque.'));
   const out = button(session, 'Log out', '', () => logOut());
-  const power = row(parts);
+  const power = session;
   const enable = button(power, 'Enable', '', () => order('enable'));
   const disable = button(power, 'Disable', '', () => order('disable'));
   const reset = button(power, 'Reset faults', '', () => order('reset'));
@@ -57,7 +59,7 @@ function buildControl(node, axis) {
   const values = row(parts);
   const velocity = field(values, `Velocity, ${unit}/s`, 'control-velocity');
   const acceleration = field(values, `Acceleration, ${unit}/s²`, 'control-acceleration');
-  const jogs = row(parts);
+  const jogs = values;
   const [minus, plus] = [['-', 'Jog −'], ['', 'Jog +']].map(([sign, text]) => {
     const jog = button(jogs, text, 'jog');
     jog.title = 'Moves while it is held';
@@ -94,7 +96,7 @@ function buildControl(node, axis) {
   Object.assign(control, {
     axis,
     state: '',
-    nodes: { says, login, secret, parts, take, back, out, enable, disable, reset, velocity, acceleration, minus, plus, target, move, home, live },
+    nodes: { says, login, secret, parts, caution, take, back, out, enable, disable, reset, velocity, acceleration, minus, plus, target, move, home, live },
     said: null,
   });
   if (control.offer === null) {
@@ -145,10 +147,8 @@ function showControl(axis) {
     setClass(nodes.says, `says ${why[1]}`.trim());
   } else if (why === null && control.said === null) {
     const plain = control.offer.encrypted ? '' : ' This connection is not encrypted.';
-    setText(nodes.says, isOpen()
-      ? 'You have control. Nobody may be in the danger zone. The axis stops when you release a key, leave this page or lose the network.'
-      : `You are logged in.${plain}`);
-    setClass(nodes.says, `says ${isOpen() ? 'waits' : ''}`.trim());
+    setText(nodes.says, isOpen() ? 'You have control.' : `You are logged in.${plain}`);
+    setClass(nodes.says, 'says');
   }
   showButtons();
 }
@@ -166,6 +166,7 @@ function showButtons() {
   set(['minus', 'plus', 'move', 'home'], operates);
   // A button that is disabled sees no release.
   if (!operates) release();
+  nodes.caution.hidden = !isOpen();
   byId('stop-bar').hidden = control.socket === null;
   document.body.classList.toggle('has-control', control.socket !== null);
   setText(byId('stop-axis'), control.axis || '');
