@@ -45,7 +45,7 @@ function buildControl(node, axis) {
   });
   const parts = node.appendChild(element('div'));
   const caution = parts.appendChild(element('p', 'says waits',
-    'Nobody may be in the danger zone. This is not a safety function: the axis stops when you release a button, leave the page or lose the network.'));
+    'Nobody may be in the danger zone. The axis stops when you release the button, leave the page or lose the network, but this is not a safety function.'));
   const session = row(parts);
   const take = button(session, 'Take control', '', () => takeControl());
   take.id = 'take-control';
@@ -59,7 +59,7 @@ function buildControl(node, axis) {
   const values = row(parts);
   const velocity = field(values, `Velocity, ${unit}/s`, 'control-velocity');
   const acceleration = field(values, `Acceleration, ${unit}/s²`, 'control-acceleration');
-  const jogs = values;
+  const jogs = values.appendChild(element('div', 'jogs'));
   const [minus, plus] = [['-', 'Jog −'], ['', 'Jog +']].map(([sign, text]) => {
     const jog = button(jogs, text, 'jog');
     jog.title = 'Moves while it is held';
