@@ -45,6 +45,8 @@ pub enum LineKind {
     Modbus,
     /// An HTTP connection was refused.
     Http,
+    /// Somebody was refused who would control axes over HTTP.
+    Login,
     /// A client of local control was refused or lost.
     LocalRefused,
     /// A client of local control has come or gone.
@@ -65,6 +67,7 @@ impl LineKind {
             Self::Setting => "setting refused",
             Self::Modbus => "Modbus client refused",
             Self::Http => "HTTP connection refused",
+            Self::Login => "HTTP control refused",
             Self::LocalRefused => "client of local control refused or lost",
             Self::LocalClient => "client of local control",
         }
@@ -216,7 +219,7 @@ mod tests {
 
     use super::*;
 
-    const KINDS: [LineKind; 11] = [
+    const KINDS: [LineKind; 12] = [
         LineKind::Stream,
         LineKind::Stalled,
         LineKind::Open,
@@ -226,6 +229,7 @@ mod tests {
         LineKind::Setting,
         LineKind::Modbus,
         LineKind::Http,
+        LineKind::Login,
         LineKind::LocalRefused,
         LineKind::LocalClient,
     ];

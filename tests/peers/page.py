@@ -23,13 +23,13 @@ SIZES = {"desk": (1280, 900, False), "phone": (390, 844, True)}
 class Browser:
     """A browser, and what it has reported."""
 
-    def __init__(self, chromium, profile):
+    def __init__(self, chromium, profile, more=()):
         to_read, self.to_browser = os.pipe()
         self.from_browser, to_write = os.pipe()
         arguments = [
             chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars", "--no-first-run",
             "--disable-background-networking", "--disable-component-update", "--no-default-browser-check",
-            f"--user-data-dir={profile}", "--remote-debugging-pipe", "about:blank",
+            f"--user-data-dir={profile}", *more, "--remote-debugging-pipe", "about:blank",
         ]
         # The browser reads commands from descriptor 3 and writes answers to descriptor 4.
         def descriptors():
@@ -243,4 +243,5 @@ def main():
     print(json.dumps(report))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -11,6 +11,7 @@ mod can_bus;
 mod data_sheet;
 mod devicenet_bus;
 mod frames;
+mod http;
 mod marks;
 mod modbus;
 pub mod schema;
@@ -61,6 +62,7 @@ pub fn check(request: &Request<'_>) -> Outcome {
     let mut tables = mapping::check::texts(texts, of_tables);
     if let Some(written) = &written {
         axes(&tables, written, &mut findings);
+        http::check(written, &mut findings);
     }
     tables.findings.extend(findings);
     tables.findings.settle();

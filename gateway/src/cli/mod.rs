@@ -33,6 +33,7 @@ mod simulate;
 mod snapshot;
 mod status;
 mod time;
+mod token;
 mod translate;
 
 use std::io::{self, IsTerminal, Write as _};
@@ -74,6 +75,8 @@ enum Command {
     Param(param::ParamCommand),
     /// Move axes without a controller: enable, jog, move, home, stop, reset.
     Control(ControlArguments),
+    /// Make the token that lets people control axes from the page, and write its hash to a file.
+    Token(TokenArguments),
     /// Check mapping tables, overlays and a configuration, and explain the findings.
     Check(CheckArguments),
     /// Write the electronic data sheets of the devices for the controller's tool.
@@ -247,6 +250,20 @@ struct ControlArguments {
     /// Requests of local control, such as "move turntable 0.75 velocity=1", one after the other. Default: the lines of standard input.
     #[arg(value_name = "REQUEST")]
     requests: Vec<String>,
+}
+
+/// Arguments of `token`.
+#[derive(Debug, Args)]
+struct TokenArguments {
+    /// The file to write, with mode 0600: the hash of the token, for `token` in the `[http]` table of the configuration.
+    #[arg(long, value_name = "FILE")]
+    output: PathBuf,
+    /// Take a token of your own: from the terminal, which does not show it, or the first line of standard input. At least 16 characters.
+    #[arg(long)]
+    own: bool,
+    /// Replace an existing file.
+    #[arg(long)]
+    replace: bool,
 }
 
 /// Arguments of `bundle`.
@@ -859,6 +876,7 @@ pub fn main() -> ExitCode {
         Command::Record(arguments) => record::run(&arguments),
         Command::Contacts(arguments) => contacts::run(&arguments),
         Command::Control(arguments) => control::run(&arguments),
+        Command::Token(arguments) => token::run(&arguments),
         Command::Bundle(arguments) => bundle::run(&arguments),
         Command::Param(command) => param::run(&command),
         Command::Check(arguments) => check::run(&arguments),

@@ -23,12 +23,14 @@ use crate::history::{EventRing, Histories, LinesOf, RingLayer};
 use crate::mapping::Mapping;
 use crate::runner;
 use crate::settings::Store;
+use crate::sys::memory::return_large_blocks;
 
 /// How often the box is looked after.
 const LOOK_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Runs the box until it is asked to end.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
+    return_large_blocks();
     let (mut good, findings) = read(&arguments.config).map_err(|findings| refusal(&findings))?;
     let events = Arc::new(EventRing::default());
     log_to_stderr(good.config.log_level, &events);

@@ -175,6 +175,19 @@ pub struct HttpTable {
     /// Default: 64.
     #[schemars(range(min = 8, max = 256))]
     pub connections_max: Option<Spanned<i64>>,
+    /// File with the hash of the token that lets people control axes, which `axisbridge token` writes, relative to the folder of this file.
+    /// Default: none, and nobody controls axes over HTTP.
+    #[schemars(transform = form::path)]
+    pub token: Option<Spanned<String>>,
+    /// File with the certificate of the server and those that have signed it (PEM), relative to the folder of this file. Default: none, and
+    /// nothing is encrypted.
+    #[schemars(transform = form::path)]
+    pub certificate: Option<Spanned<String>>,
+    /// File with the private key of the certificate (PEM), relative to the folder of this file.
+    #[schemars(transform = form::path)]
+    pub key: Option<Spanned<String>>,
+    /// Whether the token may cross the network without encryption. Default: false.
+    pub plain: Option<Spanned<bool>>,
 }
 
 /// `[mappings]`

@@ -196,7 +196,8 @@ impl Written {
         let written = Self::parse_in(folder, &source, &name, findings).map(|mut written| {
             let config = &mut written.config;
             let paths = config.mappings_dir.iter_mut().chain(&mut config.overlays);
-            for path in paths.chain(&mut config.settings_file).chain(&mut config.history_dir) {
+            let of_http = config.http.iter_mut().flat_map(Http::paths);
+            for path in paths.chain(&mut config.settings_file).chain(&mut config.history_dir).chain(of_http) {
                 *path = folder.join(&*path);
             }
             written
@@ -360,6 +361,27 @@ pub struct Http {
     pub clients: Hosts,
     /// Connections open at once, 8 to 256.
     pub connections_max: u16,
+    /// File with the hash of the token; without it nobody controls axes.
+    pub token: Option<PathBuf>,
+    /// The files for TLS; without them nothing is encrypted.
+    pub tls: Option<TlsFiles>,
+}
+
+/// The files of an HTTP server with TLS.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TlsFiles {
+    /// The certificate of the server and those that have signed it (PEM).
+    pub certificate: PathBuf,
+    /// Its private key (PEM).
+    pub key: PathBuf,
+}
+
+impl Http {
+    /// The paths of its files.
+    fn paths(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let tls = self.tls.iter_mut().flat_map(|tls| [&mut tls.certificate, &mut tls.key]);
+        self.token.iter_mut().chain(tls)
+    }
 }
 
 /// Registers that are a parameter of a drive.

@@ -182,7 +182,13 @@ fn values_given_are_taken() {
     );
     assert_eq!(
         config.http,
-        Some(Http { listen: "[::1]:80".parse().unwrap(), clients: Hosts::EVERYBODY, connections_max: 256 })
+        Some(Http {
+            listen: "[::1]:80".parse().unwrap(),
+            clients: Hosts::EVERYBODY,
+            connections_max: 256,
+            token: None,
+            tls: None
+        })
     );
     assert_eq!(config.mappings_dir.as_deref(), Some(Path::new("maps")));
     let device = &config.devices[0];
@@ -495,8 +501,13 @@ fn paths_count_from_the_file() {
     let folder = std::env::temp_dir().join(format!("axisbridge-config-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("box.toml");
+    let http =
+        "[http]\nlisten = \"127.0.0.1:80\"\ntoken = \"hash\"\ncertificate = \"c.pem\"\nkey = \"/k.pem\"\n";
     let text = GOOD
-        .replace("[[device]]", "[mappings]\ndir = \"maps\"\noverlays = [\"own.toml\"]\n[[device]]")
+        .replace(
+            "[[device]]",
+            &format!("{http}[mappings]\ndir = \"maps\"\noverlays = [\"own.toml\"]\n[[device]]"),
+        )
         .replace("[box]", "[history]\ndirectory = \"state\"\n[box]\nsettings_file = \"set.toml\"");
     std::fs::write(&path, text).unwrap();
     let config = Config::load(&path).unwrap();
@@ -505,6 +516,10 @@ fn paths_count_from_the_file() {
     assert_eq!(config.overlays, [folder.join("own.toml")]);
     assert_eq!(config.settings_file, Some(folder.join("set.toml")));
     assert_eq!(config.history_dir, Some(folder.join("state")));
+    let http = config.http.unwrap();
+    assert_eq!(http.token, Some(folder.join("hash")));
+    let files = TlsFiles { certificate: folder.join("c.pem"), key: "/k.pem".into() };
+    assert_eq!(http.tls, Some(files));
 }
 
 #[test]

@@ -3,7 +3,9 @@
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
+use super::control;
 use super::downloads::{self, ContactList};
+use super::login::{self, Offer, Opened};
 use super::sheet::AxisSheet;
 use super::traces::{AxisTraces, TimeTraces};
 use super::view::{FaultList, HTTP_FAULTS_MAX, HTTP_LINES_MAX, LogLines, Look};
@@ -28,6 +30,8 @@ pub fn openapi() -> Value {
     let times = generator.subschema_for::<TimeTraces>();
     let sheet = generator.subschema_for::<AxisSheet>();
     let contacts = generator.subschema_for::<ContactList>();
+    let offer = generator.subschema_for::<Offer>();
+    let opened = generator.subschema_for::<Opened>();
     let schemas = generator.take_definitions(false);
     let json = |schema: &schemars::Schema| json!({ "application/json": { "schema": schema } });
     let text = |kind: &str| json!({ kind: { "schema": { "type": "string" } } });
@@ -115,7 +119,7 @@ pub fn openapi() -> Value {
         "info": {
             "title": "Axisbridge",
             "version": env!("CARGO_PKG_VERSION"),
-            "description": "The state of a running gateway. Every path is read-only.",
+            "description": "The state of a running gateway. Every path is read-only but those of sessions and control.",
         },
         "paths": {
             "/": file("Page for people", "text/html"),
@@ -143,8 +147,10 @@ pub fn openapi() -> Value {
                 json!({ "200": good("OpenAPI 3.1", json!({ "application/json": { "schema": { "type": "object" } } })) }),
             ),
         },
-        "components": { "schemas": schemas },
+        "components": { "schemas": schemas, "securitySchemes": { "bearer": { "type": "http", "scheme": "bearer" } } },
     });
+    description["paths"]["/api/v1/session"] = login::describe(&json!(offer), &json!(opened));
+    description["paths"]["/api/v1/control"] = control::describe();
     for (path, described) in downloads::describe(&json!(contacts)) {
         description["paths"][path] = described;
     }

@@ -26,13 +26,12 @@ const REQUEST_LEN_MAX: usize = 8_192;
 /// Header lines of a request.
 const HEADERS_MAX: usize = 64;
 
-/// One connection, as it is served: one request, within its limits.
+/// One connection, as it is served, within its limits. Every answer but that of a WebSocket closes it: `routes` says so in its head.
 pub fn builder(header_time_out: Duration) -> http1::Builder {
     let mut builder = http1::Builder::new();
     builder
         .timer(TokioTimer::new())
         .header_read_timeout(header_time_out)
-        .keep_alive(false)
         .max_headers(HEADERS_MAX)
         .max_buf_size(REQUEST_LEN_MAX);
     builder

@@ -1,4 +1,4 @@
-//! A read-only HTTP server: health, metrics, status, and a page for people.
+//! The HTTP server: health, metrics, status, a page for people, and control of the axes for those who have the token.
 //!
 //! ```text
 //! cycle thread --status--> View --Look--> /healthz /readyz /metrics /api/v1/status
@@ -9,14 +9,18 @@
 //! ```
 //!
 //! The server has one thread of its own, below the priority of every other one, and takes only what the cycle thread
-//! publishes anyway: requests, viewers and floods cost the cycle nothing. No request changes anything.
+//! publishes anyway: requests, viewers and floods cost the cycle nothing. No request changes anything but those of [`control`], which are the
+//! requests of the Unix socket ([`crate::local`]).
 
+mod access;
 mod api;
+mod control;
 mod downloads;
 mod events;
 mod files;
 mod health;
 mod limits;
+mod login;
 mod metrics;
 mod page;
 mod routes;
@@ -24,9 +28,11 @@ mod server;
 mod sheet;
 #[cfg(test)]
 mod tests;
+pub mod tls;
 mod traces;
 mod view;
 
+pub use access::{BadToken, SECRET_LEN_MIN, Token, UnfitSecret, hash, random_secret};
 pub use api::openapi;
 pub use downloads::ContactList;
 pub use files::Files;

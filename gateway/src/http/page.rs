@@ -10,6 +10,7 @@ pub const CSS: &str = include_str!("page/page.css");
 pub const JS: &str = concat!(
     include_str!("page/page.js"),
     include_str!("page/charts.js"),
+    include_str!("page/control.js"),
     include_str!("page/axis.js"),
     include_str!("page/bus.js"),
     include_str!("page/time.js"),

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use axum::Router;
 use axum::extract::{RawQuery, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue,
-    REFERRER_POLICY, RETRY_AFTER, X_CONTENT_TYPE_OPTIONS,
+    CACHE_CONTROL, CONNECTION, CONTENT_DISPOSITION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName,
+    HeaderValue, REFERRER_POLICY, RETRY_AFTER, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{Method, StatusCode};
 use axum::middleware::map_response;
@@ -16,8 +16,10 @@ use serde::Serialize;
 use tokio::sync::Semaphore;
 
 use super::api::openapi;
+use super::control;
 use super::downloads;
 use super::events::Events;
+use super::login::{self, Gate};
 use super::metrics::metrics;
 use super::page;
 use super::server::Load;
@@ -52,9 +54,13 @@ pub struct Sources {
     pub load: Arc<Load>,
     /// One file is made and sent at a time.
     pub downloads: Arc<Semaphore>,
+    /// Control of the axes; `None` without a token.
+    pub gate: Option<Arc<Gate>>,
+    /// Whether connections are encrypted.
+    pub encrypted: bool,
 }
 
-/// The paths of the server. `GET` and `HEAD` are answered; every other method is refused.
+/// The paths of the server. `GET` and `HEAD` are answered; every other method is refused, but those of sessions.
 pub fn routes(sources: Sources) -> Router {
     Router::new()
         .route("/", get(async || typed("text/html; charset=utf-8", page::HTML)))
@@ -72,6 +78,8 @@ pub fn routes(sources: Sources) -> Router {
         .route("/api/v1/axis", get(axis))
         .route("/api/v1/eds", get(eds))
         .route("/api/v1/configuration", get(configuration))
+        .route("/api/v1/session", login::route())
+        .route("/api/v1/control", get(control::control))
         .merge(downloads::routes())
         .route("/api/v1/openapi.json", get(async || typed(JSON, openapi().to_string())))
         .fallback(async || (StatusCode::NOT_FOUND, typed(TEXT, "there is nothing at this path\n")))
@@ -82,6 +90,10 @@ pub fn routes(sources: Sources) -> Router {
 async fn with_headers(mut response: Response) -> Response {
     for (name, value) in EVERYWHERE {
         response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    // A connection has one request. That of a WebSocket goes on without HTTP.
+    if response.status() != StatusCode::SWITCHING_PROTOCOLS {
+        response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
     }
     response
 }

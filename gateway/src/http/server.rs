@@ -8,16 +8,25 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use axum::Router;
+use axum::http::Request;
+use hyper::body::Incoming;
+use hyper::service::Service;
 use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
 use profile_cip::device::hosts::Hosts;
+use rustls::ServerConfig;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::{Semaphore, oneshot};
+use tokio_rustls::TlsAcceptor;
 
+use super::access::Token;
 use super::events::Events;
 use super::limits::{HEADER_TIME_OUT, Peer, STALL_TIME_OUT, builder};
+use super::login::{Gate, Remote};
 use super::routes::{Sources, routes};
 use super::view::View;
 use crate::line_limit::{LineKind, LineLimit, Peer as LinePeer};
+use crate::local::Door;
 use crate::places::Places;
 use crate::sys::clock::monotonic_now;
 use crate::sys::thread::{self, STACK};
@@ -37,6 +46,8 @@ pub struct HttpServer {
     header_time_out: Duration,
     stall_time_out: Duration,
     limit: Arc<LineLimit>,
+    tls: Option<Arc<ServerConfig>>,
+    control: Option<(Token, Door)>,
 }
 
 /// A server that answers until this is dropped.
@@ -97,6 +108,8 @@ impl HttpServer {
             header_time_out: HEADER_TIME_OUT,
             stall_time_out: STALL_TIME_OUT,
             limit: Arc::default(),
+            tls: None,
+            control: None,
         })
     }
 
@@ -110,6 +123,18 @@ impl HttpServer {
     #[must_use]
     pub fn limit_lines(self, limit: Arc<LineLimit>) -> Self {
         Self { limit, ..self }
+    }
+
+    /// Encrypts every connection.
+    #[must_use]
+    pub fn encrypt(self, config: Arc<ServerConfig>) -> Self {
+        Self { tls: Some(config), ..self }
+    }
+
+    /// Lets those who have the token control axes, through this door.
+    #[must_use]
+    pub fn control(self, token: Token, door: Door) -> Self {
+        Self { control: Some((token, door)), ..self }
     }
 
     /// Where it listens.
@@ -162,7 +187,10 @@ impl HttpServer {
             events: Arc::clone(&events),
             load: Arc::clone(&load),
             downloads: Arc::new(Semaphore::new(1)),
+            gate: self.control.map(|(token, door)| Arc::new(Gate::new(token, door, Arc::clone(&self.limit)))),
+            encrypted: self.tls.is_some(),
         });
+        let tls = self.tls.map(TlsAcceptor::from);
         let places = Places::new(self.connections_max, self.clients);
         tokio::spawn(async move { events.run().await });
         loop {
@@ -185,16 +213,62 @@ impl HttpServer {
                 }
             };
             load.accepted.fetch_add(1, Ordering::Relaxed);
-            let peer = Peer::new(stream, self.stall_time_out, place);
-            tokio::spawn(serve(peer, router.clone(), self.header_time_out));
+            // Small messages of a control stream do not wait for one another. Without it they are only later.
+            let _ = stream.set_nodelay(true);
+            let stream = Peer::new(stream, self.stall_time_out, place);
+            let connection = Connection {
+                router: router.clone(),
+                from: Remote(peer),
+                header_time_out: self.header_time_out,
+            };
+            match tls.clone() {
+                None => drop(tokio::spawn(connection.serve(stream))),
+                Some(tls) => drop(tokio::spawn(connection.encrypt(stream, tls))),
+            }
         }
     }
 }
 
-/// Answers the one request of a connection.
-async fn serve(peer: Peer, router: Router, header_time_out: Duration) {
-    let service = TowerToHyperService::new(router);
-    if let Err(error) = builder(header_time_out).serve_connection(TokioIo::new(peer), service).await {
-        tracing::debug!(%error, "HTTP connection gone");
+/// A connection that was accepted.
+struct Connection {
+    router: Router,
+    from: Remote,
+    header_time_out: Duration,
+}
+
+impl Connection {
+    /// Answers its one request after the handshake, which may take as long as the head of a request.
+    async fn encrypt(self, stream: Peer, tls: TlsAcceptor) {
+        match tokio::time::timeout(self.header_time_out, tls.accept(stream)).await {
+            Ok(Ok(stream)) => self.serve(stream).await,
+            Ok(Err(error)) => tracing::debug!(%error, "no TLS handshake"),
+            Err(_) => tracing::debug!("no TLS handshake in time"),
+        }
+    }
+
+    /// Answers its one request.
+    async fn serve(self, stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static) {
+        let service = Named { inner: TowerToHyperService::new(self.router), from: self.from };
+        let connection = builder(self.header_time_out).serve_connection(TokioIo::new(stream), service);
+        if let Err(error) = connection.with_upgrades().await {
+            tracing::debug!(%error, "HTTP connection gone");
+        }
+    }
+}
+
+/// The router, with the host that asks in each request.
+struct Named {
+    inner: TowerToHyperService<Router>,
+    from: Remote,
+}
+
+impl Service<Request<Incoming>> for Named {
+    type Response = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Response;
+    type Error = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Error;
+    type Future = <TowerToHyperService<Router> as Service<Request<Incoming>>>::Future;
+
+    fn call(&self, mut request: Request<Incoming>) -> Self::Future {
+        request.extensions_mut().insert(self.from);
+        self.inner.call(request)
     }
 }

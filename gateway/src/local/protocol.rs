@@ -18,7 +18,7 @@ use profile_generic::time::DurationNs;
 
 use super::drive::job::{Act, Ask, Listing};
 use crate::config::{AxisKind, LogLevel};
-use crate::engine::local::{Failure, Generator, Jog, Move, Order};
+use crate::engine::local::{Failure, Generator, JOG_TIME, Jog, Move, Order};
 use crate::history::{LINES_MAX, LogQuery};
 use crate::mapping::Mapping;
 use crate::parameter::id::Id;
@@ -500,7 +500,7 @@ fn order<'a>(word: &'static str, words: &mut impl Iterator<Item = &'a str>) -> R
             let missing = BadRequest::Missing { word, what: "a velocity" };
             let velocity = Velocity(number(words.next().ok_or(missing)?, "a velocity")?);
             let options = options(words, &["acceleration"])?;
-            Order::Jog(Jog { velocity, acceleration: options.acceleration })
+            Order::Jog(Jog { velocity, acceleration: options.acceleration, time: JOG_TIME })
         }
         _ => {
             let missing = BadRequest::Missing { word, what: "a target" };
@@ -766,10 +766,17 @@ mod tests {
             ("stop x", Order::Stop),
             ("reset x", Order::Reset),
             ("home x", Order::Home),
-            ("jog x -2.5", Order::Jog(Jog { velocity: Velocity(-5 * NANO / 2), acceleration: None })),
+            (
+                "jog x -2.5",
+                Order::Jog(Jog { velocity: Velocity(-5 * NANO / 2), acceleration: None, time: JOG_TIME }),
+            ),
             (
                 "jog x 0.000000001 acceleration=10",
-                Order::Jog(Jog { velocity: Velocity(1), acceleration: Some(Acceleration(10 * NANO)) }),
+                Order::Jog(Jog {
+                    velocity: Velocity(1),
+                    acceleration: Some(Acceleration(10 * NANO)),
+                    time: JOG_TIME,
+                }),
             ),
             (
                 "move x +1.25 by=gateway acceleration=3 velocity=2",

@@ -1,14 +1,12 @@
 //! The Unix socket of local control: a bounded number of clients, each with its own connection.
 //!
 //! ```text
-//! client task --line--> parse --Request--> hub --queue--> engine
-//!             <--reply--             <--Answer--  <--queue--
+//! client task --line--> Session --> hub
+//!             <--reply--
 //! ```
 //!
 //! A client that disconnects, hangs up, or does not read its replies loses its axes: they stop.
 
-use std::collections::{HashMap, VecDeque};
-use std::fmt::Write as _;
 use std::io;
 use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
@@ -17,113 +15,22 @@ use std::time::Duration;
 
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{UnixListener, UnixStream};
-use tokio::sync::mpsc;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tracing::{info, warn};
 
-use super::attributes::Attributes;
-use super::drive::job::{Ask, Context, Job, Step};
-use super::protocol::{self, BadRequest, FileRequest, LINE_MAX, NamedParameter};
-use crate::bundle::Sources;
-use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
-use crate::engine::local::{Answer, ClientEnd, ClientId, Order, Request};
-use crate::history::{LogQuery, Selection};
-use crate::line_limit::{LineKind, LineLimit, Peer};
-use crate::parameter::known::Catalogue;
-use crate::sys::clock::monotonic_now;
+use super::hub::{Door, Shared, Who};
+use super::protocol::{BadRequest, FileRequest, LINE_MAX};
+use super::session::{Session, Taken};
+use crate::line_limit::{LineKind, Peer};
 
 /// Clients connected at the same time.
 const CLIENTS_MAX: usize = 4;
-
-/// Orders of a client without an answer.
-const PENDING_MAX: usize = 32;
-
-/// Requests of all clients that wait for the engine.
-const WAITING_MAX: usize = CLIENTS_MAX * PENDING_MAX;
 
 /// How long a client may leave a reply unread.
 const WRITE_TIME_OUT: Duration = Duration::from_secs(1);
 
 /// Bytes of a file that a client has to take within [`WRITE_TIME_OUT`].
 const PART: usize = 64 * 1_024;
-
-/// How often the queues of the engine are looked at.
-const HUB_INTERVAL: Duration = Duration::from_millis(2);
-
-/// What the clients need to know of the gateway.
-#[derive(Debug)]
-pub struct Shared {
-    /// Names of the axes in the order of the configuration.
-    pub names: Vec<String>,
-    /// Parameters that can be read and written by name.
-    pub parameters: Vec<NamedParameter>,
-    /// What is known of the drives.
-    pub catalogue: Catalogue,
-    /// What success means for each attribute.
-    pub attributes: Attributes,
-    /// How many lines clients can have written into the log.
-    pub limit: Arc<LineLimit>,
-    /// The gateway itself.
-    pub sources: Arc<Sources>,
-}
-
-impl Shared {
-    /// Whether a line about clients of this user is to be written.
-    fn admits(&self, kind: LineKind, user: Option<u32>) -> bool {
-        self.limit.admits(monotonic_now(), kind, user.map_or(Peer::Unknown, Peer::User))
-    }
-
-    /// The whole gateway, as the reply to `box`.
-    fn overview(&self) -> String {
-        let overview = self.sources.overview();
-        // The object has texts, numbers and lists, and nothing that JSON does not know.
-        let json = serde_json::to_string(&overview).unwrap_or_default();
-        format!("ok box {json}\n")
-    }
-
-    /// Lines of the log, each as an object.
-    fn log(&self, query: &LogQuery) -> String {
-        let Selection { events, next, missed } = self.sources.histories.events.select(query);
-        let mut text = String::new();
-        for event in &events {
-            let _ = writeln!(text, "event {}", serde_json::to_string(&**event).unwrap_or_default());
-        }
-        let _ = writeln!(text, "ok log {} next={next} missed={missed}", events.len());
-        text
-    }
-
-    /// The faults of an axis or of all, newest first, each as an object.
-    fn faults(&self, axis: Option<usize>) -> String {
-        let name = axis.and_then(|axis| self.names.get(axis)).map(String::as_str);
-        let records = self.sources.histories.faults.list(name);
-        let mut text = String::new();
-        for record in &records {
-            let _ = writeln!(text, "fault {}", serde_json::to_string(record).unwrap_or_default());
-        }
-        let _ = writeln!(text, "ok faults {}", records.len());
-        text
-    }
-
-    /// The first contacts, newest first, each as an object.
-    fn contacts(&self) -> String {
-        let recording = self.sources.recording.as_ref();
-        let contacts = recording.map(|recording| recording.contacts()).unwrap_or_default();
-        let mut text = String::new();
-        for contact in &contacts {
-            let _ = writeln!(text, "contact {}", serde_json::to_string(contact).unwrap_or_default());
-        }
-        let _ = writeln!(text, "ok contacts {}", contacts.len());
-        text
-    }
-
-    /// The state of an axis in the words of the protocol.
-    fn state(&self, axis: usize) -> String {
-        let Sources { status, installation, .. } = &*self.sources;
-        let (status, named) = (status.read(), installation.axes.get(axis));
-        named
-            .zip(status.axes.get(axis))
-            .map_or_else(String::new, |(named, axis)| protocol::state(axis, named.kind))
-    }
-}
 
 /// The file of a socket, removed when this is dropped.
 #[derive(Debug)]
@@ -139,25 +46,8 @@ impl Drop for SocketFile {
 #[derive(Debug)]
 pub struct LocalServer {
     listener: UnixListener,
-    shared: Arc<Shared>,
-    end: ClientEnd,
-    direct: DirectEnd,
+    door: Door,
     uid: u32,
-}
-
-/// From a client's task to the hub.
-#[derive(Debug)]
-enum ToHub {
-    Ask(Request),
-    Access(DirectRequest),
-    Gone { client: ClientId },
-}
-
-/// From the hub to a client's task.
-#[derive(Debug)]
-enum ToClient {
-    Answer(Answer),
-    Accessed(DirectAnswer),
 }
 
 impl LocalServer {
@@ -165,11 +55,7 @@ impl LocalServer {
     ///
     /// # Errors
     /// The path is in use, or cannot be created.
-    pub fn bind(
-        path: &Path,
-        shared: Shared,
-        (end, direct): (ClientEnd, DirectEnd),
-    ) -> io::Result<(Self, SocketFile)> {
+    pub fn bind(path: &Path, door: Door) -> io::Result<(Self, SocketFile)> {
         if let Ok(known) = std::fs::symlink_metadata(path) {
             if !known.file_type().is_socket() {
                 return Err(io::Error::new(
@@ -186,101 +72,59 @@ impl LocalServer {
         let file = SocketFile(path.to_owned());
         std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
         let uid = rustix::process::getuid().as_raw();
-        Ok((Self { listener, shared: Arc::new(shared), end, direct, uid }, file))
+        Ok((Self { listener, door, uid }, file))
     }
 
     /// Serves clients until the future is dropped.
     pub async fn run(self) {
-        let Self { listener, shared, mut end, mut direct, uid } = self;
-        let (to_hub, mut from_clients) = mpsc::channel::<ToHub>(WAITING_MAX);
-        let mut clients: HashMap<ClientId, mpsc::Sender<ToClient>> = HashMap::new();
-        let mut waiting: VecDeque<Request> = VecDeque::new();
-        let mut accesses: VecDeque<DirectRequest> = VecDeque::new();
-        let mut last: ClientId = 0;
-        let mut interval = tokio::time::interval(HUB_INTERVAL);
-        interval.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let Self { listener, door, uid } = self;
+        let places = Arc::new(Semaphore::new(CLIENTS_MAX));
         loop {
-            tokio::select! {
-                accepted = listener.accept() => match accepted {
-                    Ok((stream, _)) => {
-                        if let Some((stream, user)) = admit(stream, uid, clients.len(), &shared) {
-                            last = last.wrapping_add(1).max(1);
-                            let (answers, for_client) = mpsc::channel(PENDING_MAX);
-                            clients.insert(last, answers);
-                            let client = Client { id: last, user, shared: Arc::clone(&shared), to_hub: to_hub.clone() };
-                            tokio::spawn(client.run(stream, for_client));
-                        }
+            match listener.accept().await {
+                Ok((stream, _)) => {
+                    if let Some((stream, user, place)) = admit(stream, uid, &places, door.shared()) {
+                        tokio::spawn(client(stream, user, door.clone(), place));
                     }
-                    Err(error) => {
-                        warn!(%error, "local control cannot accept a client");
-                        tokio::time::sleep(Duration::from_millis(100)).await;
-                    }
-                },
-                Some(message) = from_clients.recv() => match message {
-                    ToHub::Ask(request) => waiting.push_back(request),
-                    ToHub::Access(request) => accesses.push_back(request),
-                    ToHub::Gone { client } => {
-                        clients.remove(&client);
-                        accesses.retain(|request| request.client != client);
-                        waiting.push_back(Request::Gone { client });
-                    }
-                },
-                _ = interval.tick() => {}
-            }
-            while let Some(request) = waiting.pop_front() {
-                if let Err(rtrb::PushError::Full(request)) = end.requests.push(request) {
-                    waiting.push_front(request);
-                    break;
                 }
-            }
-            while let Some(request) = accesses.pop_front() {
-                if let Err(rtrb::PushError::Full(request)) = direct.requests.push(request) {
-                    accesses.push_front(request);
-                    break;
+                Err(error) => {
+                    warn!(%error, "local control cannot accept a client");
+                    tokio::time::sleep(Duration::from_millis(100)).await;
                 }
-            }
-            while let Ok(answer) = end.answers.pop() {
-                hand_on(&mut clients, answer.client, ToClient::Answer(answer));
-            }
-            while let Ok(answer) = direct.answers.pop() {
-                hand_on(&mut clients, answer.client, ToClient::Accessed(answer));
             }
         }
     }
 }
 
-/// Hands an answer to its client. The channel of one that does not read its replies is full: it is disconnected.
-fn hand_on(clients: &mut HashMap<ClientId, mpsc::Sender<ToClient>>, client: ClientId, answer: ToClient) {
-    if clients.get(&client).is_some_and(|known| known.try_send(answer).is_err()) {
-        clients.remove(&client);
-    }
-}
-
 /// Lets a client in: one of the gateway's own user or of root, as long as there is room.
-fn admit(stream: UnixStream, uid: u32, clients: usize, shared: &Shared) -> Option<(UnixStream, u32)> {
-    let refused = |user| shared.admits(LineKind::LocalRefused, user);
+fn admit(
+    stream: UnixStream,
+    uid: u32,
+    places: &Arc<Semaphore>,
+    shared: &Shared,
+) -> Option<(UnixStream, u32, OwnedSemaphorePermit)> {
+    let refused = |peer| shared.admits(LineKind::LocalRefused, peer);
     let user = match stream.peer_cred() {
         Ok(peer) if may_connect(peer.uid(), uid) => peer.uid(),
         Ok(peer) => {
-            if refused(Some(peer.uid())) {
+            if refused(Peer::User(peer.uid())) {
                 warn!(uid = peer.uid(), "local control refused a client of another user");
             }
             return None;
         }
         Err(error) => {
-            if refused(None) {
+            if refused(Peer::Unknown) {
                 warn!(%error, "local control refused a client of an unknown user");
             }
             return None;
         }
     };
-    if clients >= CLIENTS_MAX {
-        if refused(Some(user)) {
+    let Ok(place) = Arc::clone(places).try_acquire_owned() else {
+        if refused(Peer::User(user)) {
             warn!(uid = user, limit = CLIENTS_MAX, "local control refused a client: too many are connected");
         }
         return None;
-    }
-    Some((stream, user))
+    };
+    Some((stream, user, place))
 }
 
 /// Whether a user may control axes: the one that runs the gateway, and root.
@@ -289,239 +133,70 @@ const fn may_connect(peer: u32, own: u32) -> bool {
 }
 
 /// The task of one client.
-struct Client {
-    id: ClientId,
-    /// Whose process it is.
-    user: u32,
-    shared: Arc<Shared>,
-    to_hub: mpsc::Sender<ToHub>,
-}
-
-impl Client {
-    async fn run(self, mut stream: UnixStream, answers: mpsc::Receiver<ToClient>) {
-        // A program that asks for the state every second is not worth two lines each time.
-        let shown = self.shared.admits(LineKind::LocalClient, Some(self.user));
-        if shown {
-            info!(client = self.id, "local control: client connected");
-        }
-        let ended = self.serve(&mut stream, answers).await;
-        let _ = self.to_hub.send(ToHub::Gone { client: self.id }).await;
-        match ended {
-            Ok(()) if shown => info!(client = self.id, "local control: client disconnected"),
-            Ok(()) => {}
-            Err(error) if self.shared.admits(LineKind::LocalRefused, Some(self.user)) => {
-                warn!(client = self.id, %error, "local control: connection lost");
-            }
-            Err(_) => {}
-        }
+async fn client(mut stream: UnixStream, user: u32, door: Door, place: OwnedSemaphorePermit) {
+    let shared = Arc::clone(door.shared());
+    // A program that asks for the state every second is not worth two lines each time.
+    let shown = shared.admits(LineKind::LocalClient, Peer::User(user));
+    let mut session = door.enter(Who::User(user));
+    let client = session.id();
+    if shown {
+        info!(client, "local control: client connected");
     }
-
-    async fn serve(&self, stream: &mut UnixStream, mut answers: mpsc::Receiver<ToClient>) -> io::Result<()> {
-        let mut lines = Lines::default();
-        let mut pending: HashMap<u32, Accepted> = HashMap::new();
-        let mut last = 0_u32;
-        let mut buffer = [0; 512];
-        loop {
-            let reply = tokio::select! {
-                read = stream.read(&mut buffer) => {
-                    let len = read?;
-                    if len == 0 {
-                        return Ok(());
-                    }
-                    let mut replies = String::new();
-                    for byte in &buffer[..len] {
-                        let Some(line) = lines.push(*byte) else { continue };
-                        last = last.wrapping_add(1);
-                        let request = match self.parse(&line) {
-                            Ok(protocol::Request::File(wanted)) => {
-                                write(stream, std::mem::take(&mut replies).as_bytes()).await?;
-                                self.send_file(stream, wanted).await?;
-                                continue;
-                            }
-                            Ok(request) => self.request(last, request, &line, pending.len()),
-                            Err(reply) => Err(reply),
-                        };
-                        match request {
-                            Ok((accepted, request)) => {
-                                pending.insert(last, accepted);
-                                if self.to_hub.send(request).await.is_err() {
-                                    return Ok(());
-                                }
-                            }
-                            Err(reply) => replies.push_str(&reply),
-                        }
-                    }
-                    replies
-                }
-                answer = answers.recv() => {
-                    let Some(answer) = answer else {
-                        return Err(unread());
-                    };
-                    let next = match answer {
-                        ToClient::Answer(answer) => {
-                            let accepted = pending.remove(&answer.id);
-                            Err(accepted.map(|accepted| self.reply(&accepted, &answer)).unwrap_or_default())
-                        }
-                        ToClient::Accessed(answer) => self.accessed(answer, &mut pending),
-                    };
-                    match next {
-                        Err(reply) => reply,
-                        Ok(request) => match self.to_hub.send(ToHub::Access(request)).await {
-                            Ok(()) => continue,
-                            Err(_) => return Ok(()),
-                        },
-                    }
-                }
-            };
-            write(stream, reply.as_bytes()).await?;
+    let ended = serve(&mut stream, &mut session).await;
+    // Its axes stop.
+    drop((session, place));
+    match ended {
+        Ok(()) if shown => info!(client, "local control: client disconnected"),
+        Ok(()) => {}
+        Err(error) if shared.admits(LineKind::LocalRefused, Peer::User(user)) => {
+            warn!(client, %error, "local control: connection lost");
         }
-    }
-
-    /// What a line asks for; or the reply to it.
-    fn parse(&self, line: &Result<String, BadRequest>) -> Result<protocol::Request, String> {
-        let line = line.as_ref().map_err(|error| protocol::bad("-", error))?;
-        let Shared { names, parameters, .. } = &*self.shared;
-        protocol::parse(line, names, parameters).map_err(|error| protocol::bad(line, &error))
-    }
-
-    /// Makes a file and sends it: a line with its length, then its bytes.
-    async fn send_file(&self, stream: &mut UnixStream, wanted: FileRequest) -> io::Result<()> {
-        let sources = Arc::clone(&self.shared.sources);
-        // It takes tens of milliseconds, and waits for the disk.
-        let made = tokio::task::spawn_blocking(move || make(&sources, wanted)).await?;
-        let word = wanted.word();
-        match made {
-            Ok(file) => {
-                write(stream, format!("ok {word} bytes={}\n", file.len()).as_bytes()).await?;
-                for part in file.chunks(PART) {
-                    write(stream, part).await?;
-                }
-                Ok(())
-            }
-            Err(text) => write(stream, format!("error {word} - recording: {text}\n").as_bytes()).await,
-        }
-    }
-
-    /// What a request asks the engine for, under the number `id`; or the reply to it.
-    fn request(
-        &self,
-        id: u32,
-        request: protocol::Request,
-        line: &Result<String, BadRequest>,
-        pending: usize,
-    ) -> Result<(Accepted, ToHub), String> {
-        let line = line.as_ref().map_or("-", String::as_str);
-        let Shared { names, parameters, .. } = &*self.shared;
-        let number = |axis: usize| u8::try_from(axis).unwrap_or(u8::MAX);
-        let client = self.id;
-        match request {
-            protocol::Request::Box => Err(self.shared.overview()),
-            protocol::Request::Axes => Err(protocol::list(names, |axis| self.shared.state(axis))),
-            protocol::Request::Status { axis } => {
-                Err(protocol::done("status", &names[axis], &self.shared.state(axis)))
-            }
-            protocol::Request::Parameters => Err(protocol::parameter_list(parameters)),
-            protocol::Request::Log(query) => Err(self.shared.log(&query)),
-            protocol::Request::Faults { axis } => Err(self.shared.faults(axis)),
-            protocol::Request::Attributes { axis } => Err(self.shared.attributes.reply(axis, &names[axis])),
-            protocol::Request::Contacts => Err(self.shared.contacts()),
-            // Its reply is not a text: see `send_file`.
-            protocol::Request::File(_) => Err(String::new()),
-            _ if pending >= PENDING_MAX => Err(protocol::bad(line, &BadRequest::TooMany)),
-            protocol::Request::Order { axis, order } => {
-                let request = Request::Order { client, id, axis: number(axis), order };
-                Ok((Accepted { axis, what: What::Order(order) }, ToHub::Ask(request)))
-            }
-            protocol::Request::Parameter { axis, parameter, wanted } => {
-                let named = parameters[parameter].clone();
-                let parameter = named.parameter;
-                let request = Request::Parameter { client, id, axis: number(axis), parameter, wanted };
-                Ok((Accepted { axis, what: What::Parameter(named, wanted) }, ToHub::Ask(request)))
-            }
-            protocol::Request::Drive { axis, ask } => self.begin(id, axis, ask),
-        }
-    }
-
-    /// Begins with a request for parameters of a drive; or the reply to it.
-    fn begin(&self, id: u32, axis: usize, ask: Ask) -> Result<(Accepted, ToHub), String> {
-        let (job, step) = self.with_context(axis, |context| Job::begin(ask, context))?;
-        match step {
-            Step::Access(..) => {
-                let request = self.access(id, axis, step)?;
-                Ok((Accepted { axis, what: What::Drive(Box::new(job)) }, ToHub::Access(request)))
-            }
-            Step::Reply(reply) => Err(reply),
-        }
-    }
-
-    /// Goes on with a request when its drive has answered: the next access, or the reply.
-    fn accessed(
-        &self,
-        answer: DirectAnswer,
-        pending: &mut HashMap<u32, Accepted>,
-    ) -> Result<DirectRequest, String> {
-        let id = answer.id;
-        let Some(Accepted { axis, what: What::Drive(job) }) = pending.get_mut(&id) else {
-            return Err(String::new());
-        };
-        let axis = *axis;
-        let next = self.access(id, axis, self.with_context(axis, |context| job.take(answer, context)));
-        if next.is_err() {
-            pending.remove(&id);
-        }
-        next
-    }
-
-    /// What a step asks of the engine, or the reply that it is.
-    fn access(&self, id: u32, axis: usize, step: Step) -> Result<DirectRequest, String> {
-        match step {
-            Step::Access(target, direction, data) => {
-                let axis = u8::try_from(axis).unwrap_or(u8::MAX);
-                Ok(DirectRequest { client: self.id, id, axis, target, direction, data })
-            }
-            Step::Reply(reply) => Err(reply),
-        }
-    }
-
-    /// Calls with what is known of the drive of an axis.
-    fn with_context<T>(&self, axis: usize, with: impl FnOnce(&Context<'_>) -> T) -> T {
-        let Shared { names, parameters, catalogue, .. } = &*self.shared;
-        let axis_name = names.get(axis).map_or("-", String::as_str);
-        with(&Context { axis: axis_name, bus: catalogue.bus(axis), catalogue, parameters })
-    }
-
-    fn reply(&self, Accepted { axis, what }: &Accepted, answer: &Answer) -> String {
-        let name = self.shared.names.get(*axis).map_or("-", String::as_str);
-        let word = match what {
-            What::Order(order) => order.name(),
-            What::Parameter(_, None) => "read",
-            What::Parameter(_, Some(_)) => "write",
-            // Its accesses are answered by themselves.
-            What::Drive(_) => return String::new(),
-        };
-        match (&answer.result, what) {
-            (Ok(Some(value)), What::Parameter(named, _)) => protocol::accessed(word, name, named, *value),
-            (Ok(_), _) => protocol::done(word, name, &self.shared.state(*axis)),
-            (Err(failure), _) => protocol::failed(word, name, failure),
-        }
+        Err(_) => {}
     }
 }
 
-/// Makes a file; otherwise why there is none.
-fn make(sources: &Sources, wanted: FileRequest) -> Result<Vec<u8>, String> {
-    let recording = || {
-        let off = "nothing is recorded: `[recording]` has `seconds = 0`";
-        sources.recording.as_ref().ok_or_else(|| off.to_owned())
-    };
-    let made = match wanted {
-        FileRequest::Recording(last) => {
-            let recording = recording()?;
-            recording.take(last.unwrap_or_else(|| recording.span()))
+async fn serve(stream: &mut UnixStream, session: &mut Session) -> io::Result<()> {
+    let mut lines = Lines::default();
+    let mut buffer = [0; 512];
+    loop {
+        let reply = tokio::select! {
+            read = stream.read(&mut buffer) => {
+                let len = read?;
+                if len == 0 {
+                    return Ok(());
+                }
+                let mut replies = String::new();
+                for byte in &buffer[..len] {
+                    let Some(line) = lines.push(*byte) else { continue };
+                    match session.take(&line) {
+                        Taken::Reply(reply) => replies.push_str(&reply),
+                        Taken::Asked => {}
+                        Taken::File(wanted) => {
+                            write(stream, std::mem::take(&mut replies).as_bytes()).await?;
+                            send_file(stream, session, wanted).await?;
+                        }
+                    }
+                }
+                replies
+            }
+            reply = session.reply() => reply.ok_or_else(unread)?,
+        };
+        write(stream, reply.as_bytes()).await?;
+    }
+}
+
+/// Makes a file and sends it: a line with its length, then its bytes.
+async fn send_file(stream: &mut UnixStream, session: &Session, wanted: FileRequest) -> io::Result<()> {
+    match session.file(wanted).await {
+        Ok(file) => {
+            write(stream, format!("ok {} bytes={}\n", wanted.word(), file.len()).as_bytes()).await?;
+            for part in file.chunks(PART) {
+                write(stream, part).await?;
+            }
+            Ok(())
         }
-        FileRequest::Contact(number) => recording()?.take_contact(number),
-        FileRequest::Bundle => sources.bundle(),
-    };
-    made.map_err(|error| error.to_string())
+        Err(reply) => write(stream, reply.as_bytes()).await,
+    }
 }
 
 /// Writes to a client that reads.
@@ -532,20 +207,6 @@ async fn write(stream: &mut UnixStream, bytes: &[u8]) -> io::Result<()> {
 
 fn unread() -> io::Error {
     io::Error::new(io::ErrorKind::TimedOut, "the client does not read its replies")
-}
-
-/// A request that goes to the engine.
-struct Accepted {
-    axis: usize,
-    what: What,
-}
-
-/// What is asked of an axis or its drive.
-enum What {
-    Order(Order),
-    Parameter(NamedParameter, Option<i64>),
-    /// A request for parameters by the numbers of the drive.
-    Drive(Box<Job>),
 }
 
 /// Cuts a stream of bytes into lines of bounded length.
@@ -578,7 +239,7 @@ impl Lines {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::os::unix::fs::MetadataExt as _;
 
     use profile_generic::fault::{Fault, FaultCause};
@@ -589,18 +250,25 @@ mod tests {
     use profile_sercos::wire::svc::Element;
     use tokio::io::{AsyncBufReadExt as _, BufReader};
 
+    use super::super::attributes::Attributes;
+    use super::super::hub::Hub;
     use super::super::installation::{Installation, NamedAxis};
     use super::super::overview::Overview;
+    use super::super::protocol::NamedParameter;
     use super::*;
+    use crate::bundle::Sources;
     use crate::config::{AxisKind, TimeSource};
+    use crate::engine::direct::{DirectAnswer, DirectEnd, DirectRequest};
     use crate::engine::direct::{DirectFailure, Direction, Target};
     use crate::engine::local::Failure;
+    use crate::engine::local::{Answer, ClientEnd, Order, Request};
     use crate::engine::notice::Notice;
     use crate::engine::parameter::ParameterFailure;
     use crate::history::{Histories, LogEvent};
     use crate::latest::latest;
     use crate::mapping::Mapping;
     use crate::parameter::known::Bus;
+    use crate::parameter::known::Catalogue;
     use crate::status::tests::distinct;
     use crate::time::ptp::FollowerConfig;
     use crate::time::source::TimeView;
@@ -617,8 +285,8 @@ mod tests {
         folder: PathBuf,
     }
 
-    type Ends = (ClientEnd, DirectEnd);
-    type Direct = (rtrb::Consumer<DirectRequest>, rtrb::Producer<DirectAnswer>);
+    pub(crate) type Ends = (ClientEnd, DirectEnd);
+    pub(crate) type Direct = (rtrb::Consumer<DirectRequest>, rtrb::Producer<DirectAnswer>);
 
     fn named((name, kind): (&str, AxisKind)) -> NamedAxis {
         NamedAxis {
@@ -630,7 +298,7 @@ mod tests {
         }
     }
 
-    fn shared() -> Shared {
+    pub(crate) fn shared() -> Shared {
         let (publisher, status) = latest(distinct());
         drop(publisher);
         let names = ["x", "y"].map(str::to_owned).to_vec();
@@ -664,14 +332,18 @@ mod tests {
         }
     }
 
-    /// The queues of a server, and the engine's ends of those of orders and of direct accesses.
-    fn queues() -> (Ends, (rtrb::Consumer<Request>, rtrb::Producer<Answer>), Direct) {
+    /// The queues of a hub, and the engine's ends of those of orders and of direct accesses.
+    pub(crate) fn queues() -> (Ends, (rtrb::Consumer<Request>, rtrb::Producer<Answer>), Direct) {
         let (requests, taken) = rtrb::RingBuffer::new(8);
         let (given, answers) = rtrb::RingBuffer::new(8);
         let (accesses, asked) = rtrb::RingBuffer::new(8);
         let (accessed, results) = rtrb::RingBuffer::new(8);
         let direct = DirectEnd { requests: accesses, answers: results };
         ((ClientEnd { requests, answers }, direct), (taken, given), (asked, accessed))
+    }
+
+    fn door() -> Door {
+        Hub::new(shared(), queues().0).1
     }
 
     impl Bench {
@@ -682,7 +354,9 @@ mod tests {
             let (ends, (requests, answers), direct) = queues();
             let shared = shared();
             let histories = shared.sources.histories.clone();
-            let (server, file) = LocalServer::bind(&path, shared, ends).unwrap();
+            let (hub, door) = Hub::new(shared, ends);
+            let (server, file) = LocalServer::bind(&path, door).unwrap();
+            tokio::spawn(hub.run());
             tokio::spawn(server.run());
             Self { path, histories, requests, answers, direct, _file: file, folder }
         }
@@ -934,16 +608,16 @@ mod tests {
     async fn the_socket_is_this_users_and_replaces_only_what_nobody_serves() {
         let bench = Bench::start("file");
         assert_eq!(std::fs::metadata(&bench.path).unwrap().mode() & 0o777, 0o600);
-        let again = LocalServer::bind(&bench.path, shared(), queues().0);
+        let again = LocalServer::bind(&bench.path, door());
         assert_eq!(again.expect_err("it is served").kind(), io::ErrorKind::AddrInUse);
         let file = bench.path.with_extension("txt");
         std::fs::write(&file, "kept").unwrap();
-        let refused = LocalServer::bind(&file, shared(), queues().0);
+        let refused = LocalServer::bind(&file, door());
         assert_eq!(refused.expect_err("a file").kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(std::fs::read_to_string(&file).unwrap(), "kept");
         let stale = bench.path.with_extension("stale");
         drop(std::os::unix::net::UnixListener::bind(&stale).unwrap());
-        let (_server, guard) = LocalServer::bind(&stale, shared(), queues().0).expect("nobody serves it");
+        let (_server, guard) = LocalServer::bind(&stale, door()).expect("nobody serves it");
         drop(guard);
         assert!(!stale.exists(), "removed at the end");
     }

@@ -50,13 +50,13 @@ use crate::engine::port::CanPort;
 use crate::engine::registers::RegisterNorth;
 use crate::history::Histories;
 use crate::host::HostPort;
-use crate::http::{self, Fixed, HttpServer, RunningServer, Sheets, View};
+use crate::http::{self, Fixed, HttpServer, RunningServer, Sheets, Token, View};
 use crate::latest::Reader;
 use crate::line_limit::LineLimit;
 use crate::local::attributes::Attributes;
 use crate::local::installation::Installation;
 use crate::local::protocol::NamedParameter;
-use crate::local::{LocalServer, Shared, SocketFile};
+use crate::local::{Door, Hub, LocalServer, Shared, SocketFile};
 use crate::mapping::Mapping;
 use crate::modbus::{Binding, ModbusServer, Parameters};
 use crate::north::{self, ExplicitServer, ServeError};
@@ -142,6 +142,16 @@ pub enum StartError {
         address: SocketAddr,
         /// What the system said.
         source: io::Error,
+    },
+    /// A file of the HTTP server cannot be used.
+    #[error("`{key}` of [http]: {path}: {why}")]
+    HttpFile {
+        /// The key of the configuration.
+        key: &'static str,
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        why: String,
     },
     /// The recording cannot be written.
     #[error("cannot write the recording {path}: {source}")]
@@ -384,29 +394,28 @@ pub fn start(
         histories: histories.clone(),
         recording: recording.clone(),
     });
+    let has_token = config.http.as_ref().is_some_and(|http| http.token.is_some());
+    let door = (extras.local.is_some() || has_token).then(|| {
+        let shared = Shared {
+            names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
+            parameters: NamedParameter::of(engine.mapping()),
+            catalogue: Catalogue::of(config, engine.mapping()),
+            attributes: Attributes::of(config, &engine),
+            limit: Arc::clone(&limit),
+            sources: Arc::clone(&sources),
+        };
+        offer_local_control(shared, &mut engine, &runtime)
+    });
     let http = config
         .http
         .as_ref()
         .map(|http| {
             let files = http::Files { sheets, configuration: sources.files.shown() };
             let fixed = Fixed { sheets: Sheets::of(config, engine.mapping()), files };
-            serve_http(http, &sources, fixed, &limit)
+            serve_http(http, &sources, fixed, (&limit, door.as_ref()))
         })
         .transpose()?;
-    let socket = extras
-        .local
-        .map(|path| {
-            let shared = Shared {
-                names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
-                parameters: NamedParameter::of(engine.mapping()),
-                catalogue: Catalogue::of(config, engine.mapping()),
-                attributes: Attributes::of(config, &engine),
-                limit: Arc::clone(&limit),
-                sources: Arc::clone(&sources),
-            };
-            serve_local(path, shared, &mut engine, &runtime)
-        })
-        .transpose()?;
+    let socket = extras.local.zip(door).map(|(path, door)| serve_local(path, door, &runtime)).transpose()?;
     let stop_notices = Arc::new(AtomicBool::new(false));
     let scribe = Scribe::new(Installation::of(config), histories.clone(), status.clone(), limit)
         .with_recording(recording.clone());
@@ -444,16 +453,40 @@ fn serve_http(
     http: &Http,
     sources: &Arc<Sources>,
     fixed: Fixed,
-    limit: &Arc<LineLimit>,
+    (limit, door): (&Arc<LineLimit>, Option<&Door>),
 ) -> Result<RunningServer, StartError> {
+    let bad =
+        |key, path: &Path, why: String| StartError::HttpFile { key, path: path.display().to_string(), why };
+    let token = http.token.as_ref().zip(door).map(|(path, door)| match Token::read(path) {
+        Ok(token) => Ok((token, door.clone())),
+        Err(error) => Err(bad("token", path, error.to_string())),
+    });
+    let (token, tls) = (token.transpose()?, http.tls.as_ref());
+    let tls = tls.map(|files| {
+        http::tls::read(files).map_err(|http::tls::BadTls { file, why }| match file {
+            http::tls::TlsFile::Certificate => bad("certificate", &files.certificate, why.to_string()),
+            http::tls::TlsFile::Key => bad("key", &files.key, why.to_string()),
+        })
+    });
+    let tls = tls.transpose()?;
     let failed = |source| StartError::Http { address: http.listen, source };
     let server = HttpServer::bind(http.listen, http.connections_max).map_err(failed)?;
-    let server = server.serve(http.clients.clone()).limit_lines(Arc::clone(limit));
+    let mut server = server.serve(http.clients.clone()).limit_lines(Arc::clone(limit));
+    let (encrypted, control) = (tls.is_some(), token.is_some());
+    if let Some(tls) = tls {
+        server = server.encrypt(tls);
+    }
+    if let Some((token, door)) = token {
+        server = server.control(token, door);
+    }
     let address = server.local_address().map_err(failed)?;
     let view = View::new(Arc::clone(sources), fixed, WallClock::now());
     let running =
         server.start(view).map_err(|source| StartError::Thread { what: "the HTTP server", source })?;
-    info!(%address, "HTTP");
+    info!(%address, "{}", if encrypted { "HTTPS" } else { "HTTP" });
+    if control {
+        info!(encrypted, "those who have the token can control axes over HTTP");
+    }
     Ok(running)
 }
 
@@ -482,19 +515,21 @@ fn modbus_parameters(
     Ok(parameters)
 }
 
-/// Offers local control of all axes on a socket.
-fn serve_local(
-    path: &Path,
-    shared: Shared,
-    engine: &mut Engine,
-    runtime: &tokio::runtime::Runtime,
-) -> Result<SocketFile, StartError> {
+/// Offers local control of all axes to clients that come through a door.
+fn offer_local_control(shared: Shared, engine: &mut Engine, runtime: &tokio::runtime::Runtime) -> Door {
     let (local, end) = LocalNorth::new(shared.names.len());
     let (direct, accesses) = DirectNorth::new();
-    let (server, file) = LocalServer::bind(path, shared, (end, accesses))
-        .map_err(|source| StartError::Local { path: path.display().to_string(), source })?;
+    let (hub, door) = Hub::new(shared, (end, accesses));
     engine.set_local(local);
     engine.set_direct(direct);
+    runtime.spawn(hub.run());
+    door
+}
+
+/// Lets clients in on a socket.
+fn serve_local(path: &Path, door: Door, runtime: &tokio::runtime::Runtime) -> Result<SocketFile, StartError> {
+    let (server, file) = LocalServer::bind(path, door)
+        .map_err(|source| StartError::Local { path: path.display().to_string(), source })?;
     info!(socket = %path.display(), "local control");
     runtime.spawn(server.run());
     Ok(file)

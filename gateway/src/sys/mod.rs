@@ -18,6 +18,7 @@ pub mod interface_lock;
 pub mod interfaces;
 pub mod launch;
 pub mod link;
+pub mod memory;
 pub mod namespace;
 pub mod packet_socket;
 pub mod phc;

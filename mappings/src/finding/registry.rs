@@ -522,6 +522,18 @@ registry! {
         "The backup that is used as a start-up list has parameters that Axisbridge sets itself, which are left out of the list, or parameters that could not be read when it was made; or the value of an entry does not fit what the dictionary says of the parameter, where the drive may say otherwise.",
         "[[south.sercos.drive]]\nstartup_file = \"drive-a.toml\" # with S-0-0032",
         "Nothing if the list is as you meant it. Otherwise correct it.";
+    HTTP_FILE = 102 Error "a file of the HTTP server that cannot be used":
+        "The file that `token` names is not the hash of a token, or those of `certificate` and `key` are not a certificate and its private key in PEM. Axisbridge does not start with them.",
+        "[http]\nlisten = \"127.0.0.1:8080\"\ntoken = \"box.toml\" # the configuration itself",
+        "Write the token with `axisbridge token`. Check that certificate and key belong together: `openssl x509 -noout -pubkey -in CERTIFICATE` and `openssl pkey -pubout -in KEY` show the same.";
+    HTTP_FILE_ODD = 103 Warning "a file of the HTTP server with something odd":
+        "The file that `token`, `certificate` or `key` names is not there, or this user cannot read it: Axisbridge does not start where it cannot read it. Or every user of the host can read the private key or the hash of the token.",
+        "[http]\nlisten = \"127.0.0.1:8080\"\ntoken = \"not-here\"",
+        "Make the file, and give it to the user that runs the gateway, with mode 0600.";
+    HTTP_PLAIN = 104 Warning "the token crosses the network without encryption":
+        "With `plain = true`, whoever sees the packets of the network sees the token, and can move the axes with it.",
+        "[http]\nlisten = \"0.0.0.0:8080\"\ntoken = \"token\"\nplain = true",
+        "Use `certificate` and `key`, or listen on a loopback address behind a reverse proxy with TLS.";
 }
 
 #[cfg(test)]

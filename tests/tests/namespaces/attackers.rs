@@ -40,7 +40,7 @@ const GROWTH_MAX_KB: u64 = 48_000;
 type Attack = fn(Instant) -> u64;
 
 /// The attacks by name.
-const ATTACKS: [(&str, Attack); 18] = [
+const ATTACKS: [(&str, Attack); 20] = [
     ("List requests, UDP 44818", |end| datagrams(end, list_identity)),
     ("octets without a meaning, UDP 44818", |end| datagrams(end, noise)),
     ("connections opened and closed, TCP 44818", |end| connects(end, EXPLICIT)),
@@ -59,6 +59,8 @@ const ATTACKS: [(&str, Attack); 18] = [
     ("requests, HTTP", |end| streams(end, HTTP, get_metrics)),
     ("200 connections with half a head, HTTP", |end| half_open(end, HTTP, b"GET / HTTP/1.1\r\nHo")),
     ("recordings and bundles that are not read, HTTP", downloads),
+    ("wrong tokens, HTTP", |end| streams(end, HTTP, wrong_token)),
+    ("control without a session, HTTP", |end| streams(end, HTTP, no_session)),
     ("octets without a meaning, Modbus", |end| streams(end, MODBUS, noise)),
     ("200 connections with half a request, Modbus", |end| half_open(end, MODBUS, &[0, 1, 0, 0, 0, 6])),
 ];
@@ -146,6 +148,22 @@ fn oversized(random: &mut Random) -> Vec<u8> {
 
 fn get_metrics(_: &mut Random) -> Vec<u8> {
     b"GET /metrics HTTP/1.1\r\nHost: gateway\r\n\r\n".to_vec()
+}
+
+/// A token that is guessed.
+fn wrong_token(random: &mut Random) -> Vec<u8> {
+    let guess: String = noise(random).iter().map(|byte| char::from(b'a' + byte % 26)).take(40).collect();
+    let head = "POST /api/v1/session HTTP/1.1\r\nHost: gateway\r\nAuthorization: Bearer ";
+    format!("{head}sixteen-letters-{guess}\r\n\r\n").into_bytes()
+}
+
+/// A stream with the key of a session that is guessed.
+fn no_session(_: &mut Random) -> Vec<u8> {
+    let upgrade = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
+                   Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+    let key = "0123456789abcdef".repeat(4);
+    format!("GET /api/v1/control HTTP/1.1\r\nHost: gateway\r\n{upgrade}Authorization: Bearer {key}\r\n\r\n")
+        .into_bytes()
 }
 
 /// Datagrams, at most 40 000 a second.
@@ -312,7 +330,11 @@ fn configuration(name: &str) -> PathBuf {
     let text = std::fs::read_to_string(&path).expect("a configuration");
     let (shipped, here) = ("listen = \"127.0.0.1:1502\"\n", format!("listen = \"{GATEWAY}:{MODBUS}\"\n"));
     assert!(text.contains(shipped), "{text}");
-    let servers = format!("{here}\n[http]\nlisten = \"{GATEWAY}:{HTTP}\"\n");
+    let token = path.with_extension("token");
+    let hash = axisbridge::http::hash("the-token-of-this-test").expect("it is long enough");
+    std::fs::write(&token, hash).expect("the scratch folder can be written");
+    let keys = format!("token = \"{}\"\nplain = true", token.display());
+    let servers = format!("{here}\n[http]\nlisten = \"{GATEWAY}:{HTTP}\"\n{keys}\n");
     std::fs::write(&path, text.replace(shipped, &servers)).expect("the scratch folder can be written");
     path
 }

@@ -19,7 +19,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const FAULT: &str = "excessive_position_error";
 
 /// The example on an address of its own, with HTTP in place of Modbus, on a bus that survives pauses of a busy host.
-fn configuration(device: &str) -> String {
+pub fn configuration(device: &str) -> String {
     let example = include_str!("../../../examples/two-axes-in-process.toml");
     let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
     let mut text = example.replace("127.0.0.2", device).replace("allowed_losses = 4", "allowed_losses = 500");
@@ -29,10 +29,17 @@ fn configuration(device: &str) -> String {
 
 /// The address in the log.
 pub fn address(gateway: &Gateway) -> SocketAddr {
+    address_of(gateway, "HTTP")
+}
+
+/// The same for this protocol.
+pub fn address_of(gateway: &Gateway, protocol: &str) -> SocketAddr {
     let end = Instant::now() + PATIENCE;
     loop {
         let log = gateway.log();
-        let found = log.lines().find_map(|line| line.split_once(" HTTP address=")?.1.trim().parse().ok());
+        let found = log
+            .lines()
+            .find_map(|line| line.split_once(&format!(" {protocol} address="))?.1.trim().parse().ok());
         if let Some(address) = found {
             return address;
         }
@@ -49,8 +56,13 @@ pub fn connect(address: SocketAddr, request: &str) -> TcpStream {
 }
 
 /// Code, head and body of the answer; code 0 when the connection was closed.
-fn ask(address: SocketAddr, method: &str, path: &str) -> (u16, String, String) {
-    let mut stream = connect(address, &format!("{method} {path} HTTP/1.1\r\nHost: gateway\r\n\r\n"));
+pub fn ask(address: SocketAddr, method: &str, path: &str) -> (u16, String, String) {
+    ask_with(address, method, path, "")
+}
+
+/// The same with more header lines.
+pub fn ask_with(address: SocketAddr, method: &str, path: &str, lines: &str) -> (u16, String, String) {
+    let mut stream = connect(address, &format!("{method} {path} HTTP/1.1\r\nHost: gateway\r\n{lines}\r\n"));
     let mut bytes = Vec::new();
     let _ = stream.read_to_end(&mut bytes);
     let text = String::from_utf8(bytes).expect("text");
@@ -169,9 +181,15 @@ fn fault_of_a_drive_has_one_name_in_status_metrics_and_page_stream() {
                 _ => "",
             };
             // Which contact has to be said.
-            let expected = if *path == "/contact.pcapng" { 400 } else { 200 };
+            let expected = match path.as_str() {
+                "/contact.pcapng" => 400,
+                "/api/v1/control" => 403,
+                _ => 200,
+            };
             assert_eq!(ask(address, "HEAD", &format!("{path}{needed}")).0, expected, "{path}");
-            assert_eq!(ask(address, "POST", path).0, 405, "{path}");
+            // There is no token.
+            let refused = if *path == "/api/v1/session" { 403 } else { 405 };
+            assert_eq!(ask(address, "POST", path).0, refused, "{path}");
         }
         assert!(paths.len() > 8, "{paths:?}");
         assert_eq!(get(address, "/nothing").0, 404);

@@ -6,6 +6,7 @@ mod doctor;
 mod ending;
 mod histories;
 mod http;
+mod http_control;
 mod init;
 mod local;
 mod package;

@@ -2,7 +2,7 @@
 
 use axisbridge::engine::axis::Owner;
 use axisbridge::engine::local::{
-    Answer, ClientEnd, Failure, Generator, Jog, LocalNorth, Move, Order, Request,
+    Answer, ClientEnd, Failure, Generator, JOG_TIME, Jog, LocalNorth, Move, Order, Request,
 };
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
@@ -98,7 +98,11 @@ impl Bench {
 }
 
 fn jog(velocity: i64) -> Order {
-    Order::Jog(Jog { velocity: Velocity(velocity), acceleration: Some(Acceleration(20 * NANO)) })
+    Order::Jog(Jog {
+        velocity: Velocity(velocity),
+        acceleration: Some(Acceleration(20 * NANO)),
+        time: JOG_TIME,
+    })
 }
 
 fn to(place: i64, velocity: i64, by: Option<Generator>) -> Move {
@@ -156,6 +160,17 @@ fn a_jog_ends_by_itself_when_nobody_repeats_it() {
     bench.run_for(160);
     assert!(bench.speed(TURNTABLE).abs() < NANO / 50, "{}", bench.speed(TURNTABLE));
     assert_eq!(bench.state(TURNTABLE), DriveState::Operating, "with torque");
+    // One that is for a shorter time brakes sooner.
+    let short = Jog {
+        velocity: Velocity(2 * NANO),
+        acceleration: Some(Acceleration(50 * NANO)),
+        time: DurationNs::from_millis(200),
+    };
+    bench.order(TURNTABLE, Order::Jog(short)).unwrap();
+    bench.run_for(180);
+    assert!(bench.speed(TURNTABLE) > 19 * NANO / 10, "{}", bench.speed(TURNTABLE));
+    bench.run_for(80);
+    assert!(bench.speed(TURNTABLE).abs() < NANO / 50, "{}", bench.speed(TURNTABLE));
     // The other way at once, and to rest by a stop.
     bench.order(TURNTABLE, jog(3 * NANO)).unwrap();
     bench.run_for(200);
@@ -263,14 +278,18 @@ fn what_cannot_be_is_refused_and_moves_nothing() {
         (TURNTABLE, Order::Move(to(NANO, 0, None)), Err(Failure::NotPositive)),
         (
             TURNTABLE,
-            Order::Jog(Jog { velocity: Velocity(NANO), acceleration: Some(Acceleration(201 * NANO)) }),
+            Order::Jog(Jog {
+                velocity: Velocity(NANO),
+                acceleration: Some(Acceleration(201 * NANO)),
+                time: JOG_TIME,
+            }),
             Err(Failure::TooSteep(Acceleration(200 * NANO))),
         ),
         (SLIDE, Order::Move(to(1_001 * NANO, NANO, None)), Err(Failure::Beyond(Position(1_000 * NANO)))),
         (SLIDE, Order::Move(to(-6 * NANO, NANO, None)), Err(Failure::Beyond(Position(-5 * NANO)))),
         (
             SLIDE,
-            Order::Jog(Jog { velocity: Velocity(NANO), acceleration: None }),
+            Order::Jog(Jog { velocity: Velocity(NANO), acceleration: None, time: JOG_TIME }),
             Err(Failure::NoAcceleration),
         ),
     ] {
@@ -295,7 +314,11 @@ fn a_jog_ends_at_the_end_of_the_axis() {
     let mut bench = Bench::new(ALL);
     bench.order(SLIDE, Order::Enable).unwrap();
     for _ in 0..10 {
-        let jog = Jog { velocity: Velocity(-5 * NANO), acceleration: Some(Acceleration(50 * NANO)) };
+        let jog = Jog {
+            velocity: Velocity(-5 * NANO),
+            acceleration: Some(Acceleration(50 * NANO)),
+            time: JOG_TIME,
+        };
         assert_eq!(bench.order(SLIDE, Order::Jog(jog)), Ok(()));
         bench.run_for(300);
     }
@@ -403,7 +426,11 @@ fn a_jog_away_from_the_end_beyond_it_is_refused() {
     let mut bench = Bench::on(Rig::ready(Settings { configuration, ..Settings::default() }));
     bench.order(SLIDE, Order::Enable).unwrap();
     let jog = |velocity| {
-        Order::Jog(Jog { velocity: Velocity(velocity), acceleration: Some(Acceleration(50 * NANO)) })
+        Order::Jog(Jog {
+            velocity: Velocity(velocity),
+            acceleration: Some(Acceleration(50 * NANO)),
+            time: JOG_TIME,
+        })
     };
     assert_eq!(bench.order(SLIDE, jog(NANO)), Err(Failure::Beyond(Position(-NANO))));
     bench.run_for(500);

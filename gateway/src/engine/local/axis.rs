@@ -3,7 +3,7 @@
 //! ```text
 //! order    what it does                                completed when
 //! enable   waits for a ready drive, then enables it    the axis operates, and the start sequence has ended
-//! jog      the profile goes to a velocity              immediately; the axis brakes after JOG_TIME
+//! jog      the profile goes to a velocity              immediately; the axis brakes after the time of the order
 //! move     profile or drive positioning to a target    the axis stands at the target
 //! home     the drive's own homing                      the drive reports that it is homed
 //! stop     the profile brakes, or the drive halts      the axis stands
@@ -168,7 +168,7 @@ impl LocalAxis {
         let end = generator::end_of_travel(axis, jog.velocity)?;
         let mut generator = self.generator(now, axis, mode, acceleration);
         generator.run(jog.velocity, acceleration, end);
-        self.source = Source::Generator { generator, jog_ends: Some(now.0 + JOG_TIME) };
+        self.source = Source::Generator { generator, jog_ends: Some(now.0 + jog.time.min(JOG_TIME)) };
         Ok(())
     }
 

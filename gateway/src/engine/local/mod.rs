@@ -29,7 +29,7 @@ use super::notice::Notice;
 use super::parameter::{Next, ParameterFailure, ParameterJob, ParameterJobs};
 use crate::mapping::Mapping;
 
-/// How long an axis moves after a jog order. A client that hangs, or a key that is released, stops the axis.
+/// How long an axis moves after a jog order, at most. A client that hangs, or a key that is released, stops the axis.
 pub const JOG_TIME: DurationNs = DurationNs::from_millis(500);
 
 /// Length of the queues of requests and of answers.

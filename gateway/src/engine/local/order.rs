@@ -7,6 +7,7 @@ use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
 
 use crate::engine::axis::Awaited;
 use crate::engine::generator::Misfit;
@@ -26,7 +27,7 @@ pub enum Order {
     Stop,
     /// Clear the faults.
     Reset,
-    /// Move at this velocity for [`super::JOG_TIME`]; repeat the order to keep moving.
+    /// Move at this velocity for a time; repeat the order to keep moving.
     Jog(Jog),
     /// Move to a position.
     Move(Move),
@@ -41,6 +42,8 @@ pub struct Jog {
     pub velocity: Velocity,
     /// Acceleration and deceleration; `None` takes the configured one.
     pub acceleration: Option<Acceleration>,
+    /// How long the axis moves before it brakes: at most [`super::JOG_TIME`].
+    pub time: DurationNs,
 }
 
 /// A movement to a target.

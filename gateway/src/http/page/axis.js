@@ -18,6 +18,7 @@ function buildAxis(name) {
     return [part.appendChild(element('p')), part.appendChild(element('small'))];
   });
   const notes = state.appendChild(element('table')).appendChild(element('tbody'));
+  buildControl(section(view, 'axis-control', 'Local control', true), name);
   const faults = section(view, 'axis-faults', 'Faults', true);
   const charts = section(view, 'axis-traces', 'Last minute', true).appendChild(element('div', 'charts'));
   const traces = [
@@ -44,7 +45,9 @@ function buildAxis(name) {
     seen: null,
   });
   fetchOnce(`/api/v1/axis?axis=${name}`, (sheet) => {
-    if (axisView.name === name) axisView.sheet = sheet;
+    if (axisView.name !== name) return;
+    axisView.sheet = sheet;
+    suggest(sheet.limits);
   });
 }
 
@@ -67,6 +70,7 @@ function showAxis({ status, history }, name) {
   fill(drive, axis.drive_status.join(', ') || 'nothing', old ? 'old' : '',
     [old ? 'last reported' : '', axis.node ? `node ${axis.node.state}` : ''].filter(Boolean).join(', '));
   showNotes(axisView.notes, axisNotes(axis));
+  showControl(axis);
   showAxisValues(axis);
   showLimits(axis);
   if (axisView.seen !== history.faults) {

@@ -322,6 +322,7 @@ function live() {
 }
 
 function stale(why) {
+  release();
   document.body.classList.add('stale');
   const values = lastLiveAt ? ` The values below are old: they are those of ${lastLiveAt}.` : '';
   setText(byId('connection'), `${why}${values}`);

@@ -41,6 +41,7 @@ function show(look) {
   const { view, name } = wanted();
   const known = Object.hasOwn(VIEWS, view) ? view : 'unknown';
   const isNew = current.view !== view || current.name !== name;
+  if (isNew) giveBack('Control was given back: another view was opened.');
   if (isNew) {
     for (const node of document.querySelectorAll('.view')) node.hidden = node.id !== `view-${known}`;
   }
