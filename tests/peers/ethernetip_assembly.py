@@ -80,7 +80,7 @@ def main(address, motion_address):
     result["short"] = plc.open(inputsz=INPUT_LEN - 1)
     result["no_such_output"] = plc.open(consumed=OUTPUT - 1)
     result["no_such_input"] = plc.open(produced=INPUT + 1)
-    result["multicast"] = plc.open(multicast=True)
+    result["multicast"] = [plc.open(multicast=True), plc.close()]
 
     # ENABLE is 1 from the start: it does not count.
     plc.send(ENABLE | START, 125_000, 500_000)

@@ -211,7 +211,8 @@ impl Synthesizer {
         ip[4..6].copy_from_slice(&self.identification.to_be_bytes());
         // Do not fragment.
         ip[6] = 0x40;
-        ip[8] = 64;
+        // Multicasts stay on their network.
+        ip[8] = if to.ip().is_multicast() { 1 } else { 64 };
         ip[9] = protocol;
         ip[12..16].copy_from_slice(&from.ip().octets());
         ip[16..20].copy_from_slice(&to.ip().octets());

@@ -21,8 +21,11 @@ mod format {
     pub const HEARTBEAT: u32 = 3 << 8;
 }
 
-/// Bit of point to point in a field of connection types.
-const POINT_TO_POINT: u32 = 2;
+/// Bits in a field of connection types.
+mod connection_type {
+    pub const MULTICAST: u32 = 1;
+    pub const POINT_TO_POINT: u32 = 2;
+}
 
 fn point(number: u16) -> String {
     format!("Assem{number}")
@@ -61,8 +64,9 @@ pub(super) fn section(w: &mut Writer, adapter: &AdapterConfig) {
 
 /// The connections to the assemblies.
 pub(super) fn connections(w: &mut Writer, assemblies: &Assemblies) {
-    let types = 1 << (parameters::O_TO_T_TYPES + POINT_TO_POINT)
-        | 1 << (parameters::T_TO_O_TYPES + POINT_TO_POINT)
+    let types = 1 << (parameters::O_TO_T_TYPES + connection_type::POINT_TO_POINT)
+        | 1 << (parameters::T_TO_O_TYPES + connection_type::MULTICAST)
+        | 1 << (parameters::T_TO_O_TYPES + connection_type::POINT_TO_POINT)
         | parameters::O_TO_T_FIXED
         | parameters::T_TO_O_FIXED
         | parameters::O_TO_T_SCHEDULED

@@ -284,7 +284,11 @@ pub fn start(
                 let (socket, gate) = IoSocket::bind_closed(address, adapter.qos.urgent)?;
                 (socket, Some(Arc::new(gate)))
             }
-            Some(_) => (IoSocket::bind(address, adapter.qos.urgent)?, None),
+            Some(_) => {
+                let socket = IoSocket::bind(address, adapter.qos.urgent)?;
+                socket.prepare_multicast()?;
+                (socket, None)
+            }
         };
         let system = |source| BindError::System { address, step: "dup", source };
         markers.push((socket.marker().map_err(system)?, gate));

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use arrayvec::ArrayVec;
+use profile_generic::cast;
 use profile_generic::quantity::{Acceleration, Position, Torque, TorqueAbsolute, Velocity};
 use profile_generic::scaling::UnitKind;
 use profile_generic::servo::{ServoError, ServoParameters};
@@ -244,6 +245,11 @@ impl SimulatedDrives for DriveLine {
         };
         // Before its first step the servo has no state.
         (actual.report != Report::Silent).then_some(shown)
+    }
+
+    fn position(&self, drive: u16) -> Option<f64> {
+        let position = self.network.slaves()[self.index(drive)?].application().actual().position;
+        Some(cast::f64_from_i64(position.get()) * 1e-9)
     }
 
     fn apply(&mut self, drive: u16, change: Change) -> Result<(), &'static str> {

@@ -155,6 +155,18 @@ impl IoSocket {
         Ok((Self { socket, local, time_stamps, dscp: Arc::new(AtomicU8::new(dscp)) }, prepared))
     }
 
+    /// Has multicasts leave by the interface of its address, and reach the network of that interface and no other: their time to
+    /// live is 1.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn prepare_multicast(&self) -> Result<(), BindError> {
+        let address = self.local;
+        let system = |step: &'static str| move |source| BindError::System { address, step, source };
+        self.socket.set_multicast_if_v4(address.ip()).map_err(system("IP_MULTICAST_IF"))?;
+        self.socket.set_multicast_ttl_v4(1).map_err(system("IP_MULTICAST_TTL"))
+    }
+
     /// What changes the marking of this socket, also from another thread.
     ///
     /// # Errors
@@ -303,6 +315,22 @@ mod tests {
         let plain = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
         plain.send_to(&[1], b.local_address()).unwrap();
         assert_eq!(wait(&b, &mut [0; 8]).dscp, 0, "what is not marked");
+    }
+
+    #[test]
+    fn multicasts_leave_by_the_interface_of_the_address() {
+        let sender = any([127, 0, 0, 9]);
+        sender.prepare_multicast().unwrap();
+        let group = Ipv4Addr::new(239, 192, 77, 1);
+        let receiver = std::net::UdpSocket::bind((group, 0)).unwrap();
+        receiver.join_multicast_v4(&group, &Ipv4Addr::new(127, 0, 0, 1)).unwrap();
+        receiver.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        let port = receiver.local_addr().unwrap().port();
+        sender.send_to(&[5, 6], SocketAddrV4::new(group, port)).unwrap();
+        let mut buffer = [0; 8];
+        let (len, from) = receiver.recv_from(&mut buffer).unwrap();
+        assert_eq!((&buffer[..len], from), (&[5, 6][..], SocketAddr::V4(sender.local_address())));
+        assert_eq!(sender.socket.multicast_ttl_v4().unwrap(), 1);
     }
 
     #[test]

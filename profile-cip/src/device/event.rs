@@ -5,7 +5,7 @@ use crate::device::motion_link::{AssemblyRole, ConnectionTriad};
 use crate::device::objects::time_sync::TimeSyncSetting;
 use crate::wire::status::Service;
 use core::fmt;
-use core::net::SocketAddrV4;
+use core::net::{Ipv4Addr, SocketAddrV4};
 
 /// Kind of an Identity object reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +54,8 @@ pub enum Event {
         originator: SocketAddrV4,
         /// Packet intervals in microseconds, O->T and T->O.
         intervals_us: (u32, u32),
+        /// Multicast group of the data T->O, unless they go to the originator alone.
+        group: Option<Ipv4Addr>,
     },
     /// A connection to assemblies was closed by its originator.
     AssemblyClosed {
@@ -149,9 +151,13 @@ impl fmt::Display for Event {
                 write!(f, "motion {triad} of {originator} timed out: ")?;
                 silence(f, silent_us, timeout_us)
             }
-            Self::AssemblyOpened { role, triad, originator, intervals_us: (o_to_t, t_to_o) } => {
+            Self::AssemblyOpened { role, triad, originator, intervals_us: (o_to_t, t_to_o), group } => {
                 let role = role.name();
-                write!(f, "{role} {triad} opened by {originator}, intervals {o_to_t} us and {t_to_o} us")
+                write!(f, "{role} {triad} opened by {originator}, intervals {o_to_t} us and {t_to_o} us")?;
+                match group {
+                    Some(group) => write!(f, ", multicast to {group}"),
+                    None => Ok(()),
+                }
             }
             Self::AssemblyClosed { role, triad } => {
                 write!(f, "{} {triad} closed by its originator", role.name())

@@ -13,11 +13,16 @@
 use arrayvec::ArrayVec;
 use core::net::{Ipv4Addr, SocketAddrV4};
 
+use crate::assembly::layout::ASSEMBLY_LEN_MAX;
 pub use crate::wire::ConnectionTriad;
+use crate::wire::network_parameters::Priority;
 
-/// Most bytes of service data in a handed-on explicit request or its reply: what an unconnected message
+/// Most bytes of service data in a handed-on explicit request, and in replies of axes: what an unconnected message
 /// holds.
 pub const EXPLICIT_DATA_MAX: usize = 504;
+
+/// Most bytes of data in any reply: a whole assembly, which needs a large explicit connection.
+pub const EXPLICIT_REPLY_MAX: usize = ASSEMBLY_LEN_MAX;
 
 /// Most 16-bit words of extended status the device may add to a reply.
 pub const EXTENDED_STATUS_MAX: usize = 4;
@@ -98,6 +103,10 @@ pub struct AssemblyOpen {
     /// Requested packet interval of the target-to-originator direction in microseconds; [`OpenParameters::rpi_us`] is that
     /// of the other one.
     pub t_to_o_rpi_us: u32,
+    /// Priority of that direction.
+    pub t_to_o_priority: Priority,
+    /// That direction is a multicast stream, which all such connections of the device share.
+    pub multicast: bool,
 }
 
 /// What an originator may do on a connection to assemblies.
@@ -134,11 +143,12 @@ pub struct OpenParameters {
     pub triad: ConnectionTriad,
     /// Connection ID in the controller-to-device datagrams; chosen by this device, unique in its run.
     pub o_to_t_id: u32,
-    /// Connection ID to put into the device-to-controller datagrams; chosen by the controller.
+    /// Connection ID to put into the device-to-controller datagrams; chosen by the controller, of a multicast stream by this
+    /// device.
     pub t_to_o_id: u32,
     /// Address controller-to-device datagrams come from; others are not of this connection.
     pub originator: Ipv4Addr,
-    /// Where device-to-controller datagrams go (point to point).
+    /// Where device-to-controller datagrams go: to the originator, or to a multicast group.
     pub t_to_o_destination: SocketAddrV4,
     /// Requested packet interval of both directions in microseconds, which is the Controller Update Period
     /// (Volume 9 clause 7-1.1: the actual interval equals the requested one).
@@ -163,6 +173,14 @@ pub struct OpenParameters {
     pub configuration_bits: u8,
     /// A connection to assemblies in place of the motion connection.
     pub assembly: Option<AssemblyOpen>,
+}
+
+impl OpenParameters {
+    /// Group and port of the multicast stream that this connection consumes, if it does.
+    #[must_use]
+    pub fn group(&self) -> Option<SocketAddrV4> {
+        self.assembly.filter(|assembly| assembly.multicast).map(|_| self.t_to_o_destination)
+    }
 }
 
 /// Which connection ends.
@@ -260,7 +278,7 @@ pub struct ExplicitReply {
     /// Extended status words, usually none.
     pub extended_status: ArrayVec<u16, EXTENDED_STATUS_MAX>,
     /// Reply data of the service.
-    pub data: ArrayVec<u8, EXPLICIT_DATA_MAX>,
+    pub data: ArrayVec<u8, EXPLICIT_REPLY_MAX>,
 }
 
 impl ExplicitReply {

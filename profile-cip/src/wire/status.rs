@@ -137,6 +137,10 @@ open_code! {
         NULL_NOT_SUPPORTED = 0x0132 => "null Forward_Open not supported",
         /// The time-out multiplier is not possible.
         MULTIPLIER_NOT_ACCEPTABLE = 0x0133 => "connection time-out multiplier not acceptable",
+        /// Fixed or variable size, target to originator, is another one than that of the multicast stream.
+        MISMATCHED_T_TO_O_FIXED_VARIABLE = 0x0135 => "mismatched T->O fixed or variable size",
+        /// The priority, target to originator, is another one than that of the multicast stream.
+        MISMATCHED_T_TO_O_PRIORITY = 0x0136 => "mismatched T->O priority",
         /// The connection has timed out.
         TIMED_OUT = 0x0203 => "connection timed out",
         /// The answer to an unconnected request came too late.

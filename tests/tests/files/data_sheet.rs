@@ -176,7 +176,7 @@ fn the_parser_of_another_maker_reads_the_assemblies_of_a_sheet() {
         sections["Connection Manager"]["Connection1"],
         json!([
             0x0401_0002u32,
-            0x4444_0405u32,
+            0x4464_0405u32,
             "Param1",
             32,
             "Assem150",
@@ -196,8 +196,8 @@ fn the_parser_of_another_maker_reads_the_assemblies_of_a_sheet() {
         let fields = &sections["Connection Manager"][format!("Connection{number}")];
         (fields[0].as_u64(), fields[1].as_u64())
     };
-    assert_eq!(bits(2), (Some(0x0201_0002), Some(0x4444_0305)), "input only");
-    assert_eq!(bits(3), (Some(0x0101_0002), Some(0x4444_0305)), "listen only");
+    assert_eq!(bits(2), (Some(0x0201_0002), Some(0x4464_0305)), "input only");
+    assert_eq!(bits(3), (Some(0x0101_0002), Some(0x4464_0305)), "listen only");
     assert_eq!(sections["Capacity"]["TSpec1"], json!(["Rx", 38, 500]));
     let findings: Vec<_> =
         got["findings"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();

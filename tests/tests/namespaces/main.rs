@@ -9,6 +9,7 @@ mod kills;
 mod masters;
 mod misbehaviour;
 mod ptp;
+mod scanner;
 mod sercos;
 mod synchronous;
 

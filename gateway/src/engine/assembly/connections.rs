@@ -3,6 +3,9 @@
 //! A datagram counts when it comes from the address of its Forward_Open, carries the connection ID, and comes from the port of
 //! the first one that counted. Data of another length than the assembly's do not count: the connection then times out. A
 //! repeated sequence count keeps the connection, and its data are no new ones.
+//!
+//! The input assembly is sent to each originator alone, and once to the multicast group, for all connections that asked for that.
+//! The group's stream begins with the first of them and ends with the last.
 
 use std::net::SocketAddrV4;
 
@@ -46,8 +49,61 @@ struct Connection {
     port: Option<u16>,
     /// Encapsulation sequence number and sequence count of the last datagram.
     received: Option<(u32, u16)>,
-    next_send: MonotonicTime,
+    /// Where the input assembly goes for this connection alone; `None` when it consumes the multicast stream.
+    own: Option<Stream>,
+}
+
+/// The input assembly on its way to somebody.
+#[derive(Debug, Clone, Copy)]
+struct Stream {
+    id: u32,
+    to: Destination,
+    interval: DurationNs,
+    next: MonotonicTime,
     sent: u32,
+}
+
+impl Stream {
+    fn new(now: MonotonicTime, open: &OpenParameters) -> Self {
+        let us = open.assembly.map_or(open.rpi_us, |assembly| assembly.t_to_o_rpi_us);
+        Self {
+            id: open.t_to_o_id,
+            to: open.t_to_o_destination,
+            interval: DurationNs::from_micros(i64::from(us.max(1))),
+            next: now,
+            sent: 0,
+        }
+    }
+
+    /// Whether both are one stream.
+    fn is_that_of(&self, other: &Self) -> bool {
+        (self.id, self.to, self.interval) == (other.id, other.to, other.interval)
+    }
+
+    /// Sends the input assembly if it is due; whether all went well.
+    fn transmit(
+        &mut self,
+        now: MonotonicTime,
+        input: &[u8],
+        buffer: &mut [u8],
+        port: &mut dyn NorthPort,
+    ) -> bool {
+        if self.next > now {
+            return true;
+        }
+        let next = self.next + self.interval;
+        // What could not be sent in time is left out.
+        self.next = if next <= now { now + self.interval } else { next };
+        self.sent = self.sent.wrapping_add(1);
+        let [low, high, ..] = self.sent.to_le_bytes();
+        let datagram = Class1Datagram {
+            connection_id: self.id,
+            encapsulation_sequence: self.sent,
+            sequence_count: u16::from_le_bytes([low, high]),
+            data: input,
+        };
+        datagram.emit(buffer).is_ok_and(|len| port.send(&buffer[..len], self.to))
+    }
 }
 
 impl Connection {
@@ -58,19 +114,12 @@ impl Connection {
             deadline: now + timeout(&open).max(FIRST_DATAGRAM),
             port: None,
             received: None,
-            next_send: now,
-            sent: 0,
+            own: open.group().is_none().then(|| Stream::new(now, &open)),
         }
     }
 
     fn role(&self) -> AssemblyRole {
         self.open.assembly.map_or(AssemblyRole::ExclusiveOwner, |assembly| assembly.role)
-    }
-
-    /// Interval of the input assembly.
-    fn interval(&self) -> DurationNs {
-        let us = self.open.assembly.map_or(self.open.rpi_us, |assembly| assembly.t_to_o_rpi_us);
-        DurationNs::from_micros(i64::from(us.max(1)))
     }
 
     /// Whether a datagram of this connection counts.
@@ -101,6 +150,8 @@ pub(super) struct Connections {
     listeners: ArrayVec<Connection, LISTENERS_MAX>,
     /// Listen-only connections that have nothing to listen to any more.
     ended: ArrayVec<u32, LISTENERS_MAX>,
+    /// The multicast stream, while a connection consumes it.
+    group: Option<Stream>,
     /// The last data of the owner in run.
     output: Box<[u8]>,
     link: Link,
@@ -118,6 +169,7 @@ impl Connections {
             owner: None,
             listeners: ArrayVec::new(),
             ended: ArrayVec::new(),
+            group: None,
             output: vec![0; assemblies.output_len()].into_boxed_slice(),
             link: Link::Lost,
             fresh: None,
@@ -161,7 +213,8 @@ impl Connections {
 
     pub fn shortest_interval(&self) -> Option<DurationNs> {
         let owner = self.owner().map(|open| DurationNs::from_micros(i64::from(open.rpi_us)));
-        self.owner.iter().chain(&self.listeners).map(Connection::interval).chain(owner).min()
+        let own = self.owner.iter().chain(&self.listeners).filter_map(|one| one.own);
+        own.chain(self.group).map(|stream| stream.interval).chain(owner).min()
     }
 
     /// Opens a connection.
@@ -171,18 +224,40 @@ impl Connections {
             extended_status: status.0,
         };
         let connection = Connection::new(now, open);
+        let stream = Stream::new(now, &open);
+        if open.group().is_some() && self.group.is_some_and(|group| !group.is_that_of(&stream)) {
+            // The explicit side hands out one stream at a time.
+            return Err(refusal(ConnectionStatus::OUT_OF_CONNECTIONS));
+        }
         if connection.role() != AssemblyRole::ExclusiveOwner {
             let full = |_| refusal(ConnectionStatus::OUT_OF_CONNECTIONS);
-            return self.listeners.try_push(connection).map_err(full);
+            self.listeners.try_push(connection).map_err(full)?;
+            self.join(&open, stream);
+            return Ok(());
         }
         if self.owner.is_some() {
             return Err(refusal(ConnectionStatus::OWNERSHIP_CONFLICT));
         }
         self.owner = Some(connection);
+        self.join(&open, stream);
         self.link = Link::Idle;
         self.fresh = None;
         self.arrivals = ArrivalClock::new(DurationNs::from_micros(i64::from(open.rpi_us.max(1))));
         Ok(())
+    }
+
+    /// Begins the multicast stream for its first connection.
+    fn join(&mut self, open: &OpenParameters, stream: Stream) {
+        if open.group().is_some() {
+            self.group.get_or_insert(stream);
+        }
+    }
+
+    /// Ends the multicast stream behind its last connection.
+    fn leave(&mut self) {
+        if self.owner.iter().chain(&self.listeners).all(|one| one.own.is_some()) {
+            self.group = None;
+        }
     }
 
     /// Closes the connection with this ID, if there is one.
@@ -191,6 +266,7 @@ impl Connections {
             self.lose_owner();
         }
         self.listeners.retain(|one| one.open.o_to_t_id != o_to_t_id);
+        self.leave();
     }
 
     fn lose_owner(&mut self) {
@@ -204,10 +280,13 @@ impl Connections {
         };
         if let Some(owner) = self.owner.filter(|owner| owner.deadline <= now) {
             self.lose_owner();
+            self.leave();
             return Some(silence(&owner));
         }
         let late = self.listeners.iter().position(|one| one.deadline <= now)?;
-        Some(silence(&self.listeners.swap_remove(late)))
+        let late = self.listeners.swap_remove(late);
+        self.leave();
+        Some(silence(&late))
     }
 
     /// Ends listen-only connections that have nothing to listen to any more.
@@ -219,6 +298,7 @@ impl Connections {
         let ended = self.listeners.drain(..).map(|one| one.open.o_to_t_id);
         // There is room: what was taken out of the same number of places.
         self.ended.extend(ended);
+        self.leave();
     }
 
     /// The ID of a listen-only connection that was ended.
@@ -287,26 +367,10 @@ impl Connections {
 
     /// Sends the input assembly on each connection on which it is due.
     pub fn transmit(&mut self, now: MonotonicTime, input: &[u8], port: &mut dyn NorthPort) {
-        let Self { owner, listeners, buffer, counts, .. } = self;
-        for one in owner.iter_mut().chain(listeners) {
-            if one.next_send > now {
-                continue;
-            }
-            let interval = one.interval();
-            let next = one.next_send + interval;
-            // What could not be sent in time is left out.
-            one.next_send = if next <= now { now + interval } else { next };
-            one.sent = one.sent.wrapping_add(1);
-            let [low, high, ..] = one.sent.to_le_bytes();
-            let datagram = Class1Datagram {
-                connection_id: one.open.t_to_o_id,
-                encapsulation_sequence: one.sent,
-                sequence_count: u16::from_le_bytes([low, high]),
-                data: input,
-            };
-            let to: Destination = one.open.t_to_o_destination;
-            let sent = datagram.emit(buffer).is_ok_and(|len| port.send(&buffer[..len], to));
-            counts.send_failures += u64::from(!sent);
+        let Self { owner, listeners, group, buffer, counts, .. } = self;
+        let own = owner.iter_mut().chain(listeners).filter_map(|one| one.own.as_mut());
+        for stream in own.chain(group) {
+            counts.send_failures += u64::from(!stream.transmit(now, input, buffer, port));
         }
     }
 }
@@ -320,6 +384,7 @@ mod tests {
 
     use profile_cip::assembly::Layout;
     use profile_cip::device::motion_link::{AssemblyOpen, ConnectionTriad, Token};
+    use profile_cip::wire::network_parameters::Priority;
 
     use super::*;
     use crate::engine::port::Datagram;
@@ -368,8 +433,21 @@ mod tests {
             t_to_o_dscp: 47,
             format_revision: 0,
             configuration_bits: 0,
-            assembly: Some(AssemblyOpen { role, t_to_o_rpi_us: 2 * RPI_US }),
+            assembly: Some(AssemblyOpen {
+                role,
+                t_to_o_rpi_us: 2 * RPI_US,
+                t_to_o_priority: Priority::SCHEDULED,
+                multicast: false,
+            }),
         }
+    }
+
+    const GROUP: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(239, 192, 1, 0), 2222);
+
+    fn multicast(id: u32, role: AssemblyRole) -> OpenParameters {
+        let one = open(id, role);
+        let assembly = one.assembly.map(|assembly| AssemblyOpen { multicast: true, ..assembly });
+        OpenParameters { t_to_o_id: 500, t_to_o_destination: GROUP, assembly, ..one }
     }
 
     fn owned() -> (Connections, Port) {
@@ -498,5 +576,57 @@ mod tests {
             connections.transmit(at(step * 1_000), &[0xAB; 20], &mut port);
         }
         assert_eq!(port.outbound.len() - before, 2);
+    }
+
+    #[test]
+    fn connections_to_a_group_share_one_stream_that_ends_with_the_last_of_them() {
+        let (mut connections, mut port) = owned();
+        connections.open(at(0), multicast(8, AssemblyRole::InputOnly)).unwrap();
+        connections.open(at(3_000), multicast(9, AssemblyRole::ListenOnly)).unwrap();
+        let run = |connections: &mut Connections, port: &mut Port, steps: std::ops::Range<i64>| {
+            port.outbound.clear();
+            for step in steps {
+                connections.transmit(at(step * 1_000), &[0xAB; 20], port);
+            }
+            let parsed = port.outbound.iter().map(|(bytes, to)| (Class1Datagram::parse(bytes).unwrap(), *to));
+            parsed.map(|(one, to)| (one.connection_id, to, one.encapsulation_sequence)).collect::<Vec<_>>()
+        };
+        let sent = run(&mut connections, &mut port, 0..20);
+        let to_group: Vec<_> = sent.iter().filter(|(id, ..)| *id == 500).collect();
+        // One datagram in 8 ms, whoever listens.
+        assert_eq!(to_group, [&(500, GROUP, 1), &(500, GROUP, 2), &(500, GROUP, 3)]);
+        assert_eq!(
+            sent.iter().filter(|(id, to, _)| *id == 107 && *to.ip() == PLC).count(),
+            3,
+            "the owner's own"
+        );
+
+        let other = OpenParameters { t_to_o_id: 501, ..multicast(10, AssemblyRole::InputOnly) };
+        let refused = connections.open(at(20_000), other).map_err(|refused| refused.extended_status);
+        assert_eq!(refused, Err(0x0113), "there is one stream");
+        // The first of its connections goes, and the stream goes on in its order.
+        connections.close(8);
+        assert_eq!(connections.shortest_interval(), Some(DurationNs::from_micros(i64::from(RPI_US))));
+        let sent = run(&mut connections, &mut port, 20..30);
+        assert!(sent.contains(&(500, GROUP, 4)), "{sent:?}");
+        // With the owner the last connection goes that is more than listen-only.
+        connections.close(7);
+        connections.end_listen_only();
+        assert_eq!(connections.poll_ended(), Some(9));
+        assert_eq!(run(&mut connections, &mut port, 30..60), []);
+
+        // An owner may consume it too, and a stream that begins again counts from 1.
+        connections.open(at(60_000), multicast(11, AssemblyRole::ExclusiveOwner)).unwrap();
+        connections.open(at(60_000), multicast(12, AssemblyRole::InputOnly)).unwrap();
+        assert_eq!(run(&mut connections, &mut port, 60..68), [(500, GROUP, 1)]);
+        take(&mut connections, &mut port, at(68_000), &datagram(11, 1, 1, 1, 0), (PLC, 2222));
+        assert_eq!(connections.poll_lost(at(84_000)), Some((11, 16_000)));
+        assert_eq!(
+            run(&mut connections, &mut port, 84..85),
+            [(500, GROUP, 2)],
+            "the other one still listens"
+        );
+        connections.close(12);
+        assert_eq!(run(&mut connections, &mut port, 92..120), []);
     }
 }

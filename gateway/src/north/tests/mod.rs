@@ -134,7 +134,7 @@ fn willing(request: &MotionRequest) -> MotionReply {
         MotionRequest::Close(close) => MotionReply::Closed { token: close.token },
         MotionRequest::PrepareReset(token) => MotionReply::ResetPrepared { token: *token, granted: true },
         MotionRequest::Explicit(explicit) => MotionReply::Explicit(ExplicitReply {
-            data: explicit.data.clone(),
+            data: explicit.data.iter().copied().collect(),
             ..ExplicitReply::status(explicit.token, 0)
         }),
     }

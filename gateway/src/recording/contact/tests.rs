@@ -200,6 +200,7 @@ fn end_of_a_connection_is_that_of_its_contact() {
     bench.update(3_000, 10, NodeStatus::SYNC_MODE, AxisStateCode::RUNNING, None);
     assert_eq!(bench.newest(), contact);
     let opened = Event::AssemblyOpened {
+        group: None,
         role: AssemblyRole::ExclusiveOwner,
         triad: triad(3),
         originator: controller(10),

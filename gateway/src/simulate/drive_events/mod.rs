@@ -174,6 +174,12 @@ pub trait SimulatedDrives {
     /// The state of a drive.
     fn state(&self, drive: u16) -> Option<Self::State>;
 
+    /// Where the motor of a drive is, in revolutions or millimetres; `None` where that is not shown.
+    fn position(&self, drive: u16) -> Option<f64> {
+        let _ = drive;
+        None
+    }
+
     /// Carries out a change.
     ///
     /// # Errors

@@ -109,11 +109,12 @@ impl<D: SimulatedDrives> Player<D> {
         }
     }
 
-    /// Shows the state of every drive.
+    /// Shows the state of every drive, and where it is.
     pub fn show(&self, drives: &D, say: &mut dyn FnMut(&str)) {
         for number in self.names.numbers.clone() {
             if let Some(state) = drives.state(number) {
-                say(&format!("{} {number}: {state}", self.names.what));
+                let position = drives.position(number).map(|position| format!(", at {position:.3}"));
+                say(&format!("{} {number}: {state}{}", self.names.what, position.unwrap_or_default()));
             }
         }
     }

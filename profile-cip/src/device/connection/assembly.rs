@@ -9,14 +9,15 @@
 //! | 152 | input only | sequence count, with or without run/idle header | input assembly |
 //! | 153 | listen only | as 152 | input assembly |
 //!
-//! Data go to one receiver. A multicast T->O direction is refused.
+//! T->O data go to the originator, or to a multicast group. All connections that ask for multicast consume one stream: interval,
+//! priority, and fixed or variable size have to be those of the first one. O->T is point to point.
 
 use super::path::AssemblyPath;
 use super::refusal::Refusal;
 use crate::assembly::layout::{CONFIGURATION_POINT, INPUT_ONLY_POINT, LISTEN_ONLY_POINT};
 use crate::assembly::{Assemblies, RUN_IDLE_LEN};
 use crate::device::config::MotionConfig;
-use crate::device::motion_link::AssemblyRole;
+use crate::device::motion_link::{AssemblyRole, OpenParameters};
 use crate::wire::class1::SEQUENCE_COUNT_LEN;
 use crate::wire::forward_open::{ForwardOpen, Trigger};
 use crate::wire::network_parameters::{ConnectionType, NetworkParameters};
@@ -54,12 +55,13 @@ pub(crate) fn check_path(path: &AssemblyPath<'_>, assemblies: &Assemblies) -> Re
     Ok(role)
 }
 
-/// Checks transport, directions, sizes and intervals.
+/// Checks transport, directions, sizes and intervals; `stream` is a connection of the multicast stream, where there is one.
 pub(crate) fn check_parameters(
     open: &ForwardOpen<'_>,
     role: AssemblyRole,
     assemblies: &Assemblies,
     intervals: &MotionConfig,
+    stream: Option<&OpenParameters>,
 ) -> Result<(), Refusal> {
     if open.transport.class != 1 {
         let found = u32::from(open.transport.class);
@@ -69,8 +71,9 @@ pub(crate) fn check_parameters(
         let (found, expected) = (u32::from(open.transport.trigger.0), u32::from(Trigger::CYCLIC.0));
         return Err(Refusal::value(ConnectionStatus::TRIGGER_NOT_SUPPORTED, found, expected));
     }
-    check_type(&open.o_to_t, ConnectionStatus::INVALID_O_TO_T_TYPE)?;
-    check_type(&open.t_to_o, ConnectionStatus::INVALID_T_TO_O_TYPE)?;
+    let multicast = open.t_to_o.connection_type == ConnectionType::MULTICAST;
+    check_type(&open.o_to_t, ConnectionStatus::INVALID_O_TO_T_TYPE, false)?;
+    check_type(&open.t_to_o, ConnectionStatus::INVALID_T_TO_O_TYPE, multicast)?;
     let (size, wrong) = (open.o_to_t.size, ConnectionStatus::INVALID_O_TO_T_SIZE);
     match role {
         AssemblyRole::ExclusiveOwner if size != assemblies.o_to_t_size() => {
@@ -100,11 +103,37 @@ pub(crate) fn check_parameters(
         let found = if o_to_t_fits { open.t_to_o_rpi_us } else { open.o_to_t_rpi_us };
         return Err(Refusal::intervals(found, o_to_t, t_to_o));
     }
+    match stream.filter(|_| multicast) {
+        Some(stream) => check_stream(open, stream),
+        None => Ok(()),
+    }
+}
+
+/// Checks that a connection can consume the stream of another one.
+fn check_stream(open: &ForwardOpen<'_>, stream: &OpenParameters) -> Result<(), Refusal> {
+    let Some(assembly) = stream.assembly else { return Ok(()) };
+    if open.t_to_o_rpi_us != assembly.t_to_o_rpi_us {
+        let (found, expected) = (open.t_to_o_rpi_us, assembly.t_to_o_rpi_us);
+        return Err(Refusal::stream_interval(found, open.o_to_t_rpi_us, expected));
+    }
+    if open.t_to_o.variable != stream.t_to_o_variable {
+        let status = ConnectionStatus::MISMATCHED_T_TO_O_FIXED_VARIABLE;
+        return Err(Refusal::value(status, open.t_to_o.variable.into(), stream.t_to_o_variable.into()));
+    }
+    if open.t_to_o.priority != assembly.t_to_o_priority {
+        let status = ConnectionStatus::MISMATCHED_T_TO_O_PRIORITY;
+        let (found, expected) = (open.t_to_o.priority.0, assembly.t_to_o_priority.0);
+        return Err(Refusal::value(status, found.into(), expected.into()));
+    }
     Ok(())
 }
 
-fn check_type(parameters: &NetworkParameters, status: ConnectionStatus) -> Result<(), Refusal> {
-    if parameters.connection_type != ConnectionType::POINT_TO_POINT {
+fn check_type(
+    parameters: &NetworkParameters,
+    status: ConnectionStatus,
+    multicast: bool,
+) -> Result<(), Refusal> {
+    if !multicast && parameters.connection_type != ConnectionType::POINT_TO_POINT {
         let (found, expected) =
             (u32::from(parameters.connection_type.0), u32::from(ConnectionType::POINT_TO_POINT.0));
         return Err(Refusal::value(status, found, expected));

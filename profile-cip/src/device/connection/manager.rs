@@ -205,6 +205,12 @@ impl ConnectionManager {
         Ok(())
     }
 
+    /// A connection that consumes the multicast stream, while there is one that goes on.
+    pub fn stream(&self) -> Option<&OpenParameters> {
+        let goes_on = self.io().filter(|one| matches!(one, Motion::Opening(..) | Motion::Open(_)));
+        goes_on.filter_map(Motion::parameters).find(|open| open.group().is_some())
+    }
+
     /// The state of the connection to assemblies, or of the motion connection, of this triad.
     pub fn io_of(&mut self, triad: ConnectionTriad) -> Option<&mut Motion> {
         let of = |one: &&mut Motion| one.parameters().is_some_and(|open| open.triad == triad);

@@ -56,6 +56,21 @@ impl Refusal {
         refusal
     }
 
+    /// A packet interval T->O that is not the one of the multicast stream; the reply says of both, O->T first,
+    /// what they are, and then which ones would do.
+    pub fn stream_interval(found_us: u32, o_to_t_us: u32, t_to_o_us: u32) -> Self {
+        /// The interval is acceptable.
+        const ACCEPTABLE: u8 = 0;
+        /// No other interval would do.
+        const REQUIRED: u8 = 4;
+        let mut refusal = Self::value(ConnectionStatus::RPI_NOT_ACCEPTABLE, found_us, t_to_o_us);
+        let [a, b, c, d] = o_to_t_us.to_le_bytes();
+        let [e, f, g, h] = t_to_o_us.to_le_bytes();
+        let octets = [[ACCEPTABLE, REQUIRED], [a, b], [c, d], [e, f], [g, h]];
+        refusal.extended.extend(octets.map(u16::from_le_bytes));
+        refusal
+    }
+
     /// First word of extended status, 0 without one.
     pub fn first_extended(&self) -> u16 {
         self.extended.first().copied().unwrap_or(0)

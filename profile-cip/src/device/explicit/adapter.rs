@@ -20,8 +20,8 @@ use core::net::{Ipv4Addr, SocketAddrV4};
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use super::list;
-use super::node::{Node, micros};
-use super::session::{Input, ReplyTo, Session};
+use super::node::{AwaitKind, Node, micros};
+use super::session::{Input, Opened, ReplyTo, Session};
 use crate::device::config::{AdapterConfig, ConfigError, QosConfig};
 use crate::device::counters::Counters;
 use crate::device::event::Event;
@@ -246,7 +246,12 @@ impl Adapter {
             self.session_mut(slot)?.transaction = Some(transaction);
             return None;
         };
-        let opened = matches!(reply, MotionReply::Opened { outcome: Ok(()), .. });
+        let opened = match (reply, transaction.awaited.kind) {
+            (MotionReply::Opened { outcome: Ok(()), .. }, AwaitKind::Open(open, _)) => {
+                Opened { io: true, group: open.group() }
+            }
+            _ => Opened::default(),
+        };
         self.resume(now, slot, transaction, bytes, opened);
         self.pump(now, slot);
         Some(slot)
@@ -277,7 +282,7 @@ impl Adapter {
             let slot = session.slot;
             if let Some(transaction) = session.transaction.take_if(|one| one.deadline <= now) {
                 let bytes = self.node.give_up(&transaction.awaited);
-                self.resume(now, slot, transaction, bytes, false);
+                self.resume(now, slot, transaction, bytes, Opened::default());
                 self.pump(now, slot);
             } else if let Some(at) = session.inactive_at(inactivity).filter(|at| *at <= now) {
                 session.closing = true;
@@ -477,7 +482,7 @@ impl Adapter {
         if connection.last_sequence == Some(sequence) {
             let reply = connection.last_reply.clone();
             self.node.counters.connected_repeated += 1;
-            self.reply(slot, reply_to, &reply, false);
+            self.reply(slot, reply_to, &reply, Opened::default());
             return Ok(());
         }
         connection.last_sequence = Some(sequence);

@@ -8,7 +8,7 @@ use profile_generic::time::MonotonicTime;
 
 use super::adapter::{Adapter, DEVICE_TIMEOUT, SessionSlot, UNCONNECTED_REPLY_MAX, packet_bytes};
 use super::node::{Await, Node, Origin, Step};
-use super::session::{Multiple, ReplyTo, Transaction};
+use super::session::{Multiple, Opened, ReplyTo, Transaction};
 use crate::device::objects::class::{CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER};
 use crate::device::objects::object::{Answer, data_status};
 use crate::device::objects::router;
@@ -62,20 +62,20 @@ impl Adapter {
             Err(answer) => {
                 self.node.counters.requests_refused += 1;
                 let reply = answer.into_reply(Service::UNCONNECTED_SEND, origin.reply_max);
-                return self.reply(slot, reply_to, &reply, false);
+                return self.reply(slot, reply_to, &reply, Opened::default());
             }
         };
         match split(&self.node, message) {
             None => match self.node.execute(&origin, message) {
-                Step::Done(reply) => self.reply(slot, reply_to, &reply, false),
-                Step::Await(awaited) => self.wait(&origin, reply_to, awaited, None, false),
+                Step::Done(reply) => self.reply(slot, reply_to, &reply, Opened::default()),
+                Step::Await(awaited) => self.wait(&origin, reply_to, awaited, None, Opened::default()),
             },
-            Some(Ok(multiple)) => self.run(&origin, reply_to, multiple, false),
+            Some(Ok(multiple)) => self.run(&origin, reply_to, multiple, Opened::default()),
             Some(Err(status)) => {
                 self.node.counters.requests_refused += 1;
                 let answer = Answer::status(status);
                 let reply = answer.into_reply(Service::MULTIPLE_SERVICE_PACKET, origin.reply_max);
-                self.reply(slot, reply_to, &reply, false);
+                self.reply(slot, reply_to, &reply, Opened::default());
             }
         }
     }
@@ -83,7 +83,7 @@ impl Adapter {
     /// Runs the services of a packet one after the other, up to the end or to one for the motion device.
     ///
     /// A packet whose replies outgrow the reply ends there; services already run stay run.
-    fn run(&mut self, origin: &Origin, reply_to: ReplyTo, mut multiple: Multiple, opened: bool) {
+    fn run(&mut self, origin: &Origin, reply_to: ReplyTo, mut multiple: Multiple, opened: Opened) {
         loop {
             let size: usize = multiple.replies.iter().map(|reply| reply.len() + 2).sum();
             let parsed = MultipleService::parse(&multiple.data).ok();
@@ -108,7 +108,7 @@ impl Adapter {
         reply_to: ReplyTo,
         awaited: Await,
         multiple: Option<Multiple>,
-        opened: bool,
+        opened: Opened,
     ) {
         let t_to_o_socket = origin.t_to_o_socket;
         let deadline = origin.now + DEVICE_TIMEOUT;
@@ -125,10 +125,10 @@ impl Adapter {
         slot: SessionSlot,
         transaction: Transaction,
         reply: Vec<u8>,
-        opened: bool,
+        opened: Opened,
     ) {
         let Transaction { reply_to, t_to_o_socket, multiple, .. } = transaction;
-        let opened = transaction.opened || opened;
+        let opened = transaction.opened.and(opened);
         let Some(origin) = self.origin(now, slot, reply_to, t_to_o_socket) else { return };
         match multiple {
             None => self.reply(slot, reply_to, &reply, opened),
@@ -140,20 +140,22 @@ impl Adapter {
     }
 
     /// Sends a reply the way its request came.
-    pub(crate) fn reply(&mut self, slot: SessionSlot, reply_to: ReplyTo, reply: &[u8], opened: bool) {
+    pub(crate) fn reply(&mut self, slot: SessionSlot, reply_to: ReplyTo, reply: &[u8], opened: Opened) {
         let Some(session_handle) = self.session(slot).and_then(|session| session.handle) else { return };
         let interface = &self.node.config.interface;
         let mut socket = [0; SOCKADDR_LEN];
         let address = SocketAddrV4::new(interface.address, interface.io_port);
         let other_port = interface.io_port != IO_PORT && SockaddrInfo { address }.emit(&mut socket).is_ok();
+        let mut group = [0; SOCKADDR_LEN];
+        let to_group = opened.group.is_some_and(|address| SockaddrInfo { address }.emit(&mut group).is_ok());
         let (id, mut message);
-        let (command, sender_context, packet) = match reply_to {
+        let (command, sender_context, mut packet) = match reply_to {
             ReplyTo::Unconnected { sender_context } => {
                 let mut packet = CommonPacket::new(&[
                     Item { item_type: ItemType::NULL_ADDRESS, data: &[] },
                     Item { item_type: ItemType::UNCONNECTED_DATA, data: reply },
                 ]);
-                if opened && other_port {
+                if opened.io && other_port {
                     packet.items.push(Item { item_type: ItemType::SOCKADDR_O_TO_T, data: &socket });
                 }
                 (Command::SEND_RR_DATA, sender_context, packet)
@@ -176,6 +178,9 @@ impl Adapter {
                 (Command::SEND_UNIT_DATA, sender_context, packet)
             }
         };
+        if to_group {
+            packet.items.push(Item { item_type: ItemType::SOCKADDR_T_TO_O, data: &group });
+        }
         let body = EncapsulatedPacket { interface_handle: 0, timeout_s: 0, packet };
         let mut data = vec![0; body.buffer_len()];
         let status = match body.emit(&mut data) {

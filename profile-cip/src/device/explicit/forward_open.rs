@@ -1,6 +1,6 @@
 //! Forward_Open and Large_Forward_Open at this device.
 
-use core::net::SocketAddrV4;
+use core::net::{Ipv4Addr, SocketAddrV4};
 
 use super::adapter::DEVICE_TIMEOUT;
 use super::node::{Await, AwaitKind, Node, Origin, Step};
@@ -13,6 +13,7 @@ use crate::device::motion_link::{
     AssemblyOpen, AssemblyRole, ConnectionTriad, MotionRequest, OpenParameters, OpenRefusal,
 };
 use crate::device::objects::object::{Answer, data_status};
+use crate::device::objects::tcp_ip::default_group;
 use crate::wire::encapsulation::IO_PORT;
 use crate::wire::forward_open::{CONNECTION_FAILURE_LEN, ConnectionFailure, ForwardOpen, ForwardOpenReply};
 use crate::wire::message_router::Request;
@@ -90,10 +91,16 @@ fn decide(node: &mut Node, origin: &Origin, open: &ForwardOpen<'_>) -> Result<Op
             if role == AssemblyRole::ExclusiveOwner {
                 node.check_controller(*origin.peer.ip())?;
             }
-            assembly::check_parameters(open, role, assemblies, &node.config.motion)?;
+            let stream = node.connections.stream();
+            assembly::check_parameters(open, role, assemblies, &node.config.motion, stream)?;
             node.connections.check_assembly(role)?;
             node.check_reset()?;
-            let assembly = AssemblyOpen { role, t_to_o_rpi_us: open.t_to_o_rpi_us };
+            let assembly = AssemblyOpen {
+                role,
+                t_to_o_rpi_us: open.t_to_o_rpi_us,
+                t_to_o_priority: open.t_to_o.priority,
+                multicast: open.t_to_o.connection_type == ConnectionType::MULTICAST,
+            };
             open_io(node, origin, open, (0, 0, Some(assembly)))
         }
     }
@@ -149,25 +156,17 @@ fn open_io(
     open: &ForwardOpen<'_>,
     (format_revision, configuration_bits, assembly): (u8, u8, Option<AssemblyOpen>),
 ) -> Result<Opened, Refusal> {
-    // Point to point goes back to the peer itself, so of its socket address only the port counts. A group
-    // address there is a mistake the originator has to hear of.
-    let port = match origin.t_to_o_socket {
-        Some(socket) if socket.ip().is_multicast() => {
-            return Err(Refusal {
-                found: Some(u32::from(*socket.ip())),
-                ..Refusal::connection(ConnectionStatus::MULTICAST_OFF_SUBNET)
-            });
-        }
-        Some(socket) if socket.port() != 0 => socket.port(),
-        _ => IO_PORT,
+    let (t_to_o_id, t_to_o_destination) = match assembly {
+        Some(AssemblyOpen { multicast: true, .. }) => stream(node, origin)?,
+        _ => (open.t_to_o_id, point_to_point(origin)?),
     };
     let parameters = OpenParameters {
         token: node.new_token(),
         triad: open.triad,
         o_to_t_id: node.connections.new_id(),
-        t_to_o_id: open.t_to_o_id,
+        t_to_o_id,
         originator: *origin.peer.ip(),
-        t_to_o_destination: SocketAddrV4::new(*origin.peer.ip(), port),
+        t_to_o_destination,
         rpi_us: open.o_to_t_rpi_us,
         timeout_us: timeout_ns(open).magnitude() / 1000,
         o_to_t_size: open.o_to_t.size,
@@ -192,6 +191,35 @@ fn open_io(
         _ => node.connections.motion = opening,
     }
     Ok(Opened::Asked(parameters))
+}
+
+/// Where data go that are for the originator alone: back to the peer itself, so of its socket address only the port counts. A
+/// group address there is a mistake the originator has to hear of.
+fn point_to_point(origin: &Origin) -> Result<SocketAddrV4, Refusal> {
+    let port = match origin.t_to_o_socket {
+        Some(socket) if socket.ip().is_multicast() => return Err(off_subnet(*socket.ip())),
+        Some(socket) if socket.port() != 0 => socket.port(),
+        _ => IO_PORT,
+    };
+    Ok(SocketAddrV4::new(*origin.peer.ip(), port))
+}
+
+/// Connection ID and group of the multicast stream; a new ID when the stream begins. With a time to live of 1 it does not reach an
+/// originator on another subnet.
+fn stream(node: &mut Node, origin: &Origin) -> Result<(u32, SocketAddrV4), Refusal> {
+    let interface = &node.config.interface;
+    let (peer, netmask) = (*origin.peer.ip(), interface.netmask.to_bits());
+    if (peer.to_bits() ^ interface.address.to_bits()) & netmask != 0 {
+        return Err(off_subnet(peer));
+    }
+    let group = SocketAddrV4::new(default_group(interface.address, interface.netmask), IO_PORT);
+    let id = node.connections.stream().map(|open| open.t_to_o_id);
+    Ok((id.unwrap_or_else(|| node.connections.new_id()), group))
+}
+
+fn off_subnet(address: Ipv4Addr) -> Refusal {
+    let refusal = Refusal::connection(ConnectionStatus::MULTICAST_OFF_SUBNET);
+    Refusal { found: Some(u32::from(address)), ..refusal }
 }
 
 /// The answer once the motion device has taken or refused the connection.

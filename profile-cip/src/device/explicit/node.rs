@@ -532,9 +532,13 @@ fn opened(owner: &Owner) -> Event {
     let originator = owner.peer;
     match assembly {
         None => Event::MotionOpened { triad, originator, rpi_us },
-        Some(AssemblyOpen { role, t_to_o_rpi_us }) => {
-            Event::AssemblyOpened { role, triad, originator, intervals_us: (rpi_us, t_to_o_rpi_us) }
-        }
+        Some(AssemblyOpen { role, t_to_o_rpi_us, .. }) => Event::AssemblyOpened {
+            role,
+            triad,
+            originator,
+            intervals_us: (rpi_us, t_to_o_rpi_us),
+            group: owner.open.group().map(|group| *group.ip()),
+        },
     }
 }
 

@@ -44,8 +44,24 @@ pub(crate) struct Transaction {
     pub t_to_o_socket: Option<SocketAddrV4>,
     /// The packet of services this request is a part of.
     pub multiple: Option<Multiple>,
-    /// Whether a motion connection was opened on the way: the reply then says where its datagrams go.
-    pub opened: bool,
+    /// What was opened on the way.
+    pub opened: Opened,
+}
+
+/// What requests of a message have opened: the reply then says where datagrams go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Opened {
+    /// A connection whose datagrams come to this device.
+    pub io: bool,
+    /// A connection that consumes the multicast stream, which goes there.
+    pub group: Option<SocketAddrV4>,
+}
+
+impl Opened {
+    /// Both together. A device has one multicast stream.
+    pub fn and(self, other: Self) -> Self {
+        Self { io: self.io || other.io, group: self.group.or(other.group) }
+    }
 }
 
 /// A Multiple_Service_Packet under way.

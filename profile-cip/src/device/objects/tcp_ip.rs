@@ -50,7 +50,7 @@ impl Object for TcpIp<'_> {
                 string(&c.domain_name, out);
             }
             6 => string(&c.host_name, out),
-            // Time to live of multicasts. None are sent: both directions of every connection are point to point.
+            // Time to live of multicasts.
             8 => out.push(1),
             9 => {
                 out.extend([ALLOCATE_BY_DEFAULT, 0]);
@@ -107,7 +107,7 @@ impl Object for TcpIp<'_> {
 
 /// First multicast group of a device by the default algorithm: 32 groups for each host number, counted from 1 and taken
 /// modulo 1024, from 239.192.1.0 on.
-fn default_group(address: Ipv4Addr, netmask: Ipv4Addr) -> Ipv4Addr {
+pub(crate) fn default_group(address: Ipv4Addr, netmask: Ipv4Addr) -> Ipv4Addr {
     let host = (address.to_bits() & !netmask.to_bits()).wrapping_sub(1) & 0x3FF;
     Ipv4Addr::from_bits(Ipv4Addr::new(239, 192, 1, 0).to_bits() + (host << 5))
 }

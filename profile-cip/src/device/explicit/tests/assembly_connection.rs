@@ -1,12 +1,15 @@
 //! Connections to assemblies: who may open which, and what is refused with which status.
 
+use core::net::{Ipv4Addr, SocketAddrV4};
+
 use super::rig::*;
 use crate::assembly::{Assemblies, Layout};
 use crate::device::event::Event;
 use crate::device::explicit::adapter::DEVICE_TIMEOUT;
 use crate::device::motion_link::*;
+use crate::wire::cpf::ItemType;
 use crate::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
-use crate::wire::network_parameters::{ConnectionType, NetworkParameters};
+use crate::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
 use crate::wire::status::Service;
 
 const OWNER: &[u8] = &[0x20, 4, 0x24, 151, 0x2C, 150, 0x2C, 100];
@@ -104,7 +107,12 @@ fn what_does_not_fit_is_refused_with_what_would() {
         (sized(37, 42), vec![0x127, 38]),
         (sized(34, 42), vec![0x127, 38]),
         (sized(38, 41), vec![0x128, 42]),
-        (ForwardOpen { t_to_o: multicast, ..good }, vec![0x124]),
+        (ForwardOpen { o_to_t: NetworkParameters { size: 38, ..multicast }, ..good }, vec![0x123]),
+        (
+            ForwardOpen { t_to_o: NetworkParameters { redundant_owner: true, ..multicast }, ..good },
+            vec![0x125],
+        ),
+        (ForwardOpen { t_to_o: NetworkParameters { size: 41, ..multicast }, ..good }, vec![0x128, 42]),
         (ForwardOpen { transport: class3, ..good }, vec![0x11C]),
         (ForwardOpen { transport: change, ..good }, vec![0x11D]),
         (ForwardOpen { o_to_t_rpi_us: 999, ..good }, vec![0x111, 1000, 0, 4000, 0]),
@@ -134,6 +142,98 @@ fn what_does_not_fit_is_refused_with_what_would() {
         rig.device_closes();
         assert_eq!(rig.unconnected_reply(client).0.outcome(), (0, 0));
     }
+}
+
+/// A Forward_Open whose T->O direction is multicast.
+fn multicast(serial: u16, path: &'static [u8]) -> ForwardOpen<'static> {
+    let one = open(serial, path);
+    let t_to_o = NetworkParameters { connection_type: ConnectionType::MULTICAST, ..one.t_to_o };
+    ForwardOpen { t_to_o, ..one }
+}
+
+/// The reply's connection ID T->O, and the data of its socket address item T->O.
+fn joined(rig: &mut Rig, client: Client, request: &ForwardOpen<'_>) -> (u32, OpenParameters, Vec<u8>) {
+    rig.send_unconnected(client, &open_message(request));
+    let open = rig.device_opens();
+    let (answer, items) = rig.unconnected_reply(client);
+    assert_eq!(answer.outcome(), (0, 0));
+    let reply = ForwardOpenReply::parse(&answer.data).unwrap();
+    assert_eq!(items.len(), 3, "{items:?}");
+    assert_eq!(items[2].0, ItemType::SOCKADDR_T_TO_O);
+    (reply.t_to_o_id, open, items[2].1.clone())
+}
+
+/// The device is 10.0.0.9 with a mask of 24 bits: its groups begin 8 times 32 behind 239.192.1.0.
+const GROUP: [u8; 16] = [0, 2, 0x08, 0xAE, 239, 192, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+
+#[test]
+fn all_that_ask_for_multicast_consume_one_stream() {
+    let mut rig = rig();
+    let (plc, panel) = (rig.client(1), rig.client(2));
+    let (id, open_owner, item) = joined(&mut rig, plc, &multicast(1, OWNER));
+    assert_eq!(item, GROUP);
+    assert_ne!(id, multicast(1, OWNER).t_to_o_id, "the device chooses it");
+    assert_eq!(open_owner.t_to_o_id, id);
+    let group = SocketAddrV4::new(Ipv4Addr::new(239, 192, 2, 0), 2222);
+    assert_eq!((open_owner.group(), open_owner.t_to_o_destination), (Some(group), group));
+    let text = rig.events()[0].to_string();
+    assert!(text.ends_with(", multicast to 239.192.2.0"), "{text}");
+
+    let (same, input, item) = joined(&mut rig, panel, &multicast(2, INPUT_ONLY));
+    assert_eq!((same, item.as_slice()), (id, &GROUP[..]));
+    let (same, listen, _) = joined(&mut rig, panel, &multicast(3, LISTEN_ONLY));
+    assert_eq!(same, id);
+    assert_eq!(listen.originator, Ipv4Addr::new(10, 0, 0, 2));
+    // Point to point goes on beside it, at an interval of its own.
+    let alone = opened(&mut rig, panel, &ForwardOpen { t_to_o_rpi_us: 8_000, ..open(4, INPUT_ONLY) });
+    assert_eq!((alone.group(), *alone.t_to_o_destination.ip()), (None, Ipv4Addr::new(10, 0, 0, 2)));
+    rig.events();
+
+    let good = multicast(5, INPUT_ONLY);
+    let t_to_o = |change: fn(&mut NetworkParameters)| {
+        let mut parameters = good.t_to_o;
+        change(&mut parameters);
+        ForwardOpen { t_to_o: parameters, ..good }
+    };
+    for (open, extended) in [
+        // O->T 2000 us is acceptable, T->O has to be 4000 us.
+        (ForwardOpen { t_to_o_rpi_us: 8_000, ..good }, vec![0x112, 0x0400, 2_000, 0, 4_000, 0]),
+        (t_to_o(|one| one.variable = true), vec![0x135]),
+        (t_to_o(|one| one.priority = Priority::SCHEDULED), vec![0x136]),
+        (t_to_o(|one| one.size = 44), vec![0x128, 42]),
+    ] {
+        let answer = rig.refused(panel, &open);
+        assert_eq!((answer.status, answer.extended), (1, extended), "{open:?}");
+    }
+    // The owner goes, and the stream stays that of those that listen.
+    rig.complete(&MotionReply::ConnectionLost { o_to_t_id: open_owner.o_to_t_id, silent_us: 40_000 });
+    let (same, ..) = joined(&mut rig, plc, &multicast(6, OWNER));
+    assert_eq!(same, id);
+    // All of its connections go: the next one begins another stream, on its own terms.
+    for serial in [2, 3, 6] {
+        let client = if serial == 6 { plc } else { panel };
+        rig.send_unconnected(client, &close_message(serial));
+        rig.device_closes();
+        assert_eq!(rig.unconnected_reply(client).0.outcome(), (0, 0));
+    }
+    assert_eq!(input.t_to_o_id, id);
+    let (next, ..) =
+        joined(&mut rig, panel, &ForwardOpen { t_to_o_rpi_us: 8_000, ..multicast(7, INPUT_ONLY) });
+    assert_ne!(next, id);
+}
+
+#[test]
+fn a_multicast_does_not_leave_the_subnet() {
+    let mut rig = Rig::with(|config| {
+        config.assembly = Some(Assemblies::new(Layout::shipped("position").unwrap(), 2).unwrap());
+        config.interface.netmask = Ipv4Addr::new(255, 255, 255, 248);
+    });
+    let (near, far) = (rig.client(8 + 6), rig.client(1));
+    assert_eq!(rig.refused(far, &multicast(1, INPUT_ONLY)).outcome(), (1, 0x0813));
+    // Host 1 of the subnet has the first groups.
+    let (_, stream, _) = joined(&mut rig, near, &multicast(2, INPUT_ONLY));
+    assert_eq!(*stream.t_to_o_destination.ip(), Ipv4Addr::new(239, 192, 1, 0));
+    opened(&mut rig, far, &open(3, INPUT_ONLY));
 }
 
 /// Sizes and numbers are answered at once, data by the motion device, and nothing can be set.
@@ -235,6 +335,37 @@ fn connections_that_listen_are_listed_beside_the_owner() {
     assert_eq!(rig.ask(panel, &search(3)).data[..2], [34, 0]);
     opened(&mut rig, panel, &open(4, INPUT_ONLY));
     assert_eq!(rig.ask(panel, &search(4)).data[..2], [33, 0]);
+}
+
+/// An assembly may be longer than an unconnected message.
+#[test]
+fn a_long_assembly_is_read_over_a_large_connection() {
+    let mut rig = Rig::with(|config| {
+        config.assembly = Some(Assemblies::new(Layout::shipped("mixed").unwrap(), 16).unwrap())
+    });
+    let client = rig.client(1);
+    let size = usize::from(rig.adapter.config().assembly.as_ref().unwrap().t_to_o_size()) - 2;
+    assert_eq!(size, 16 * 40);
+    let get = message(Service::GET_ATTRIBUTE_SINGLE, &[0x20, 4, 0x24, 100, 0x30, 3], &[]);
+    let data: Vec<u8> = (0..size).map(|place| place.to_le_bytes()[0]).collect();
+    let large = ForwardOpen {
+        large: true,
+        o_to_t: point_to_point(1_000),
+        t_to_o: point_to_point(1_000),
+        ..explicit_open(1)
+    };
+    let large = ForwardOpenReply::parse(&rig.ask(client, &open_message(&large)).data).unwrap().o_to_t_id;
+    rig.send_connected(client, large, 1, &get);
+    rig.device_answers(&data);
+    let answer = rig.connected_reply(client).2;
+    assert_eq!((answer.status, answer.data), (0, data.clone()));
+    let small = rig.open_explicit(client, 2);
+    rig.send_connected(client, small, 1, &get);
+    rig.device_answers(&data);
+    assert_eq!(rig.connected_reply(client).2.outcome(), (0x11, 0));
+    rig.send_unconnected(client, &get);
+    rig.device_answers(&data);
+    assert_eq!(rig.unconnected_reply(client).0.outcome(), (0x11, 0));
 }
 
 #[test]
