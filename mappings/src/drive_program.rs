@@ -929,8 +929,19 @@ impl DriveProgram {
 
     /// Sets the data that the configuration has of motor and power stage, up to `DATA_MAX`. What the drive shows itself counts more.
     pub fn set_data(&mut self, data: &[(Parameter, i64)]) {
-        self.data =
-            data.iter().copied().filter(|(of, _)| self.parameter(*of).is_none()).take(DATA_MAX).collect();
+        let counting: ArrayVec<_, DATA_MAX> = self.counting(data).collect();
+        self.data = counting;
+    }
+
+    /// Whether [`DriveProgram::set_data`] would change nothing.
+    #[must_use]
+    pub fn has_data(&self, data: &[(Parameter, i64)]) -> bool {
+        self.counting(data).eq(self.data.iter().copied())
+    }
+
+    /// What counts of such data.
+    fn counting(&self, data: &[(Parameter, i64)]) -> impl Iterator<Item = (Parameter, i64)> {
+        data.iter().copied().filter(|(of, _)| self.parameter(*of).is_none()).take(DATA_MAX)
     }
 
     /// What the configuration has of a parameter that the drive does not show.

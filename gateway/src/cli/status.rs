@@ -165,7 +165,9 @@ fn axes(out: &mut String, axes: &[Axis], paint: &dyn Fn(&str, bool) -> String) {
         if let Some(waits) = &axis.waits {
             let _ = writeln!(out, "{indent}  {waits}");
         }
-        if !axis.inhibits.is_empty() {
+        if waits_for_controller(axis) {
+            let _ = writeln!(out, "{indent}  waits for a controller; local control can move it");
+        } else if !axis.inhibits.is_empty() {
             let _ = writeln!(out, "{indent}  cannot be enabled: {}", axis.inhibits.join(", "));
         }
     }
@@ -181,6 +183,11 @@ fn duration(seconds: f64) -> String {
         (0, ..) => format!("{hours} h {minutes} min"),
         _ => format!("{days} d {hours} h"),
     }
+}
+
+/// Whether nothing but the configuration by a controller is missing, which local control does not need.
+fn waits_for_controller(axis: &Axis) -> bool {
+    axis.owner == "nobody" && axis.inhibits == ["configuration_incomplete"]
 }
 
 #[cfg(test)]
@@ -279,6 +286,22 @@ mod tests {
     #[test]
     fn a_person_sees_everything_on_one_screen() {
         insta::assert_snapshot!(text(&overview(), false));
+    }
+
+    #[test]
+    fn an_axis_that_lacks_only_a_controller_can_be_moved() {
+        let said = |owner: &str, inhibits: &[&str]| {
+            let inhibits = inhibits.iter().map(|inhibit| (*inhibit).to_owned()).collect();
+            let axis = Axis { owner: owner.to_owned(), inhibits, ..axis("turntable", "rev") };
+            let text = text(&Overview { axes: vec![axis], ..overview() }, false);
+            text.lines().last().unwrap_or_default().trim().to_owned()
+        };
+        let waits = "waits for a controller; local control can move it";
+        assert_eq!(said("nobody", &["configuration_incomplete"]), waits);
+        let refused = "cannot be enabled: configuration_incomplete";
+        assert_eq!(said("controller", &["configuration_incomplete"]), refused);
+        let both = ["configuration_incomplete", "no_power"];
+        assert_eq!(said("nobody", &both), "cannot be enabled: configuration_incomplete, no_power");
     }
 
     #[test]

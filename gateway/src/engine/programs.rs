@@ -1,7 +1,7 @@
 //! The programs of the drives for readers outside of the cycle: what each drive has, since it was commissioned.
 //!
-//! A program is copied when its drive was commissioned, which allocates as commissioning itself does. The cycle never waits for a
-//! reader: while one looks at a place, the copy is made in a later cycle.
+//! They are shared, not copied: nothing is allocated in the cycle. Nor does it wait for a reader: while one looks at a place, the program
+//! is put there in a later cycle.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -50,15 +50,15 @@ impl ProgramsOfDrives {
         self.places.clone()
     }
 
-    /// Copies the programs of the drives that have got another one.
+    /// Puts the programs of the drives there that have got another one.
     pub fn publish(&mut self, axes: &[AxisChannel]) {
         for ((axis, place), published) in axes.iter().zip(self.places.0.iter()).zip(&mut self.published) {
             if *published == axis.programs() {
                 continue;
             }
-            if let Some(program) = axis.south() {
+            if let Some(program) = axis.shared_south() {
                 let Ok(mut kept) = place.program.try_lock() else { continue };
-                *kept = Some(Arc::new(program.clone()));
+                *kept = Some(program);
             }
             place.is_there.store(axis.south().is_some(), Ordering::Release);
             *published = axis.programs();

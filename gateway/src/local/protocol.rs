@@ -736,7 +736,7 @@ mod tests {
         assert_eq!(parse("  status\ty-2 ", &axes), Ok(Request::Status { axis: 1 }));
         assert_eq!(parse("parameters", &axes), Ok(Request::Parameters));
         assert_eq!(parse("contacts", &axes), Ok(Request::Contacts));
-        assert_eq!(parse("attributes y", &axes), Ok(Request::Attributes { axis: 1 }));
+        assert_eq!(parse("attributes y-2", &axes), Ok(Request::Attributes { axis: 1 }));
         for (line, wanted) in [
             ("record", FileRequest::Recording(None)),
             ("record last=30", FileRequest::Recording(Some(DurationNs::from_secs(30)))),

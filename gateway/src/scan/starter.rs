@@ -108,7 +108,7 @@ update_period = {{ {update_period} }}
 vendor_id = 65_535 # CHANGE: the number that ODVA has assigned to you
 product_code = 1
 revision = \"1.1\"
-serial_number = {number} # CHANGE: every box has its own
+serial_number = {number} # CHANGE: every gateway has its own
 product_name = \"Axisbridge\"
 ",
         number + 1,

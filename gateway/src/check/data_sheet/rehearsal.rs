@@ -5,6 +5,7 @@
 //! else could be checked.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use profile_cia402::drive::index;
 use profile_cia402::eds::DeviceDescription;
@@ -36,7 +37,7 @@ const RPM: u32 = 0x00B4_4700;
 #[derive(Debug)]
 pub enum End {
     /// With these PDOs, and the programs of the axes in their order.
-    Made(PdoSet, Vec<DriveProgram>),
+    Made(PdoSet, Vec<Arc<DriveProgram>>),
     /// The device is left out.
     Failed(Box<Notice>),
 }

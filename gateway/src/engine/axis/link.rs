@@ -1,5 +1,7 @@
 //! The axis and the telegrams of its drive: the program that makes them, and the words that went and came last.
 
+use std::sync::Arc;
+
 use profile_generic::image::{AxisCommand, AxisFeedback, StatusBits};
 use profile_generic::mode::ModeSelection;
 use profile_generic::program::ConversionReport;
@@ -13,7 +15,7 @@ use crate::mapping::{CachedStatus, DriveProgram, Order};
 /// The way to the drive of one axis, and back.
 #[derive(Debug, Default)]
 pub(super) struct Link {
-    south: Option<(DriveProgram, CachedStatus)>,
+    south: Option<(Arc<DriveProgram>, CachedStatus)>,
     /// Counts the programs of the drive that were taken or given up.
     programs: u64,
     /// What was sent last, and what the drive showed last: words, and operating modes above them.
@@ -36,7 +38,12 @@ pub(super) struct Link {
 impl Link {
     /// The program of the drive, once it is commissioned.
     pub fn program(&self) -> Option<&DriveProgram> {
-        self.south.as_ref().map(|(program, _)| program)
+        self.south.as_ref().map(|(program, _)| &**program)
+    }
+
+    /// The same, to be kept.
+    pub fn shared_program(&self) -> Option<Arc<DriveProgram>> {
+        self.south.as_ref().map(|(program, _)| Arc::clone(program))
     }
 
     /// A number that is another one after the drive has got another program or is gone.
@@ -60,7 +67,7 @@ impl Link {
     }
 
     /// The drive is spoken to by this program from now on.
-    pub fn connect(&mut self, program: DriveProgram) {
+    pub fn connect(&mut self, program: Arc<DriveProgram>) {
         let cached = program.cached_status();
         self.south = Some((program, cached));
         self.programs += 1;

@@ -59,6 +59,8 @@ mod user_limits;
 mod velocimeter;
 mod waiting;
 
+use std::sync::Arc;
+
 pub use self::counters::Totals;
 pub use self::diagnostic_message::DiagnosticMessage;
 pub use self::feed_forward::FeedForward;
@@ -497,6 +499,12 @@ impl AxisChannel {
         self.link.program()
     }
 
+    /// The same, to be kept.
+    #[must_use]
+    pub fn shared_south(&self) -> Option<Arc<DriveProgram>> {
+        self.link.shared_program()
+    }
+
     /// Sets the data that the configuration has of motor and power stage; to be called before the first cycle.
     pub fn set_data(&mut self, data: Vec<(Parameter, i64)>) {
         self.data = data;
@@ -515,9 +523,13 @@ impl AxisChannel {
         self.link.programs()
     }
 
-    /// The drive is commissioned and will be spoken to by this program.
-    pub fn set_south(&mut self, mut program: DriveProgram) {
-        program.set_data(&self.data);
+    /// The drive is commissioned and will be spoken to by this program. One that others hold too should have the data of the axis:
+    /// otherwise it is copied, which allocates.
+    pub fn set_south(&mut self, program: impl Into<Arc<DriveProgram>>) {
+        let mut program = program.into();
+        if !program.has_data(&self.data) {
+            Arc::make_mut(&mut program).set_data(&self.data);
+        }
         let constant = |of| program.datum(of).map(DurationNs);
         let constants = [Parameter::MOTOR_THERMAL_TIME, Parameter::DRIVE_THERMAL_TIME].map(constant);
         self.heats.set_constants(constants);

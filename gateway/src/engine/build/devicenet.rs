@@ -1,5 +1,7 @@
 //! The DeviceNet networks of a configuration.
 
+use std::sync::Arc;
+
 use profile_cip::device::config::DEVICE_TYPE_CIP_MOTION_DRIVE;
 use profile_cip::devicenet::master::config::{ExpectedIdentity, MasterConfig, SlaveConfig};
 use profile_cip::wire::motion::codes::ControlMode;
@@ -7,7 +9,7 @@ use profile_generic::mode::OperatingMode;
 use profile_generic::ratio::Ratio;
 use profile_generic::scaling::{NANO, UnitKind};
 
-use super::{BuildError, kind, parameters, startup};
+use super::{BuildError, axis_data, kind, parameters, startup};
 use crate::config::{Axis, AxisFunction, Config, Devicenet, DevicenetDrive, DevicenetKind, DriveAt};
 use crate::engine::bus::devicenet::commissioner::{Commissioner, commissioner};
 use crate::engine::bus::devicenet::end::{End, MotionLink, SpeedLink};
@@ -117,8 +119,9 @@ fn plan(
     number: usize,
     mapping: &Mapping,
 ) -> Result<DrivePlan, DevicenetError> {
-    let Parts { end, program, steps, .. } = parts(network, drive, axis, mapping)?;
-    Ok(DrivePlan { axis: number, mac: drive.mac, end, program, has_list: false, steps })
+    let Parts { end, mut program, steps, .. } = parts(network, drive, axis, mapping)?;
+    program.set_data(&axis_data(axis));
+    Ok(DrivePlan { axis: number, mac: drive.mac, end, program: Arc::new(program), has_list: false, steps })
 }
 
 /// What a drive is led by.

@@ -287,12 +287,17 @@ fn channel(axis: &Axis, mapping: &Mapping) -> Result<(AxisChannel, CipProgram), 
     let moves = axis.function == AxisFunction::Drive;
     let mut channel = AxisChannel::new(limits, reaction(axis.on_command_loss), moves);
     channel.set_count(program.count());
+    channel.set_data(axis_data(axis));
+    Ok((channel, program))
+}
+
+/// What the configuration has of motor and power stage.
+fn axis_data(axis: &Axis) -> Vec<(Parameter, i64)> {
     let mut data = axis.nameplate.0.clone();
     data.push((Parameter::POWER_STRUCTURE_AXIS_ID, axis.power_structure_axis_id.into()));
     let is_of_load = axis.function == AxisFunction::Encoder && axis.feedback == FeedbackUse::Load;
     data.push((Parameter::FEEDBACK_MASTER, if is_of_load { 2 } else { 1 }));
-    channel.set_data(data);
-    Ok((channel, program))
+    data
 }
 
 /// The modes that a drive is set up in: those that are wanted of it, else all that set-points lead.

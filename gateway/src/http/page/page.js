@@ -159,7 +159,10 @@ function axisNotes(axis) {
     notes.push(['fault', `Fault ${axis.fault}${code}.`, axis.advice || '']);
   }
   if (axis.waits) notes.push(['waits', 'Waits.', `The axis ${axis.waits}.`]);
-  if (axis.inhibits.length) notes.push(['waits', 'Cannot be enabled.', axis.inhibits.join(', ')]);
+  const lacks = axis.inhibits.join(', ');
+  // Local control needs no configuration by a controller.
+  if (axis.owner === 'nobody' && lacks === 'configuration_incomplete') notes.push(['waits', 'Waits for a controller.', 'Local control can move it.']);
+  else if (lacks) notes.push(['waits', 'Cannot be enabled.', lacks]);
   return notes;
 }
 

@@ -2,6 +2,7 @@
 //! and its program; then the PDOs of the device. Several requests are under way at a time. Where a device keeps its mapping, its PDOs are read first.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use profile_cia402::master::config::{Direction, MasterConfig, PdoConfig};
 use profile_cia402::master::pdo_set::PdoSet;
@@ -46,7 +47,7 @@ pub enum Order {
 #[allow(clippy::large_enum_variant, reason = "queue slots have one size, and boxing would allocate")]
 pub enum Made {
     /// The program of an axis, by its place in the device, and how its values are spread over RPDOs and TPDOs.
-    Program(u8, DriveProgram, [PdoMap; 2]),
+    Program(u8, Arc<DriveProgram>, [PdoMap; 2]),
     /// The RPDOs and TPDOs of the device: it is through. On the way back those that it had.
     Pdos(PdoSet),
 }
@@ -406,7 +407,9 @@ impl DeviceWork {
         self.pdos[0].extend(receive);
         self.pdos[1].extend(transmit);
         let which = u8::try_from(place).unwrap_or(u8::MAX);
-        context.out.push_back(Done::Made(self.run, Made::Program(which, program, [to_drive, from_drive])));
+        context
+            .out
+            .push_back(Done::Made(self.run, Made::Program(which, Arc::new(program), [to_drive, from_drive])));
         if place + 1 < self.axes.len() {
             self.set_out(place + 1, Plan::Ask, context);
         } else {

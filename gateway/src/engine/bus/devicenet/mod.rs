@@ -13,6 +13,8 @@ pub mod direct;
 pub mod end;
 pub mod setup;
 
+use std::sync::Arc;
+
 use profile_cip::devicenet::connection::ConnectionKind;
 use profile_cip::devicenet::master::Master;
 use profile_cip::devicenet::master::config::{ConfigError, MasterConfig};
@@ -72,8 +74,9 @@ pub struct DrivePlan {
     pub mac: MacId,
     /// The box's end of its poll connection.
     pub end: End,
-    /// How its axis speaks to it. Without anything on the heap, because it is copied in the cycle.
-    pub program: DriveProgram,
+    /// How its axis speaks to it, with the data that the configuration has of the axis: what the axis would put in, it would put
+    /// into a copy.
+    pub program: Arc<DriveProgram>,
     /// Whether it has a start-up list, which comes before the set-up.
     pub has_list: bool,
     /// How it is set up.
@@ -372,7 +375,7 @@ impl DevicenetBus {
                         drive.stage = Stage::Ready;
                         (drive.tried, drive.backoff) = (true, Backoff::NONE);
                         drive.command = [0; ROW_LEN];
-                        axes[axis].set_south(drive.plan.program.clone());
+                        axes[axis].set_south(Arc::clone(&drive.plan.program));
                     }
                 }
                 Stage::List(_) | Stage::Setup(..) | Stage::Unfit | Stage::Ready => {}

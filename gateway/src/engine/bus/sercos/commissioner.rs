@@ -5,6 +5,8 @@
 //! While the whole bus comes up the cycle thread does this itself, because nothing moves yet ([`Setup::poll`]). A drive that comes
 //! by hot plug is commissioned alongside the cycle ([`DriveWork`]).
 
+use std::sync::Arc;
+
 use profile_sercos::master::config::Connections;
 use profile_sercos::master::svc::request::{Shape, SvcData, SvcOutcome, SvcRequest};
 use profile_sercos::wire::header::Phase;
@@ -44,7 +46,7 @@ pub enum Progress {
     /// The drive is through with CP2.
     Connections(Connections),
     /// The drive is through with CP3.
-    Program(DriveProgram),
+    Program(Arc<DriveProgram>),
     /// The drive cannot be used.
     Failed(Notice),
 }
@@ -258,7 +260,7 @@ impl<T: Copy + PartialEq> Setup<T> {
         limitations(mapping, self.axis, self.address, &self.needs, &self.facts, &program)
             .into_iter()
             .for_each(notice);
-        Ok(Progress::Program(program))
+        Ok(Progress::Program(Arc::new(program)))
     }
 
     fn misfit(&self, error: SercosError) -> Notice {
@@ -300,7 +302,7 @@ pub enum Made {
     /// Its connections: it is through with CP2.
     Connections(Connections),
     /// Its program: it is through with CP3.
-    Program(DriveProgram),
+    Program(Arc<DriveProgram>),
 }
 
 /// The commissioning of a drive that comes by hot plug.
