@@ -192,6 +192,8 @@ impl State {
             (S::Down, E::Ready | E::Elapsed) => S::Silence0,
             // Nothing is on the wire: CP0 needs no CPS.
             (S::Silence1 | S::Silence2 | S::Silence3, E::Restart) => S::Silence0,
+            // CP1 is announced: that has to be taken back.
+            (S::Leave0, E::Stop) => S::Down,
             (S::Leave0 | S::Leave1 | S::Leave2 | S::Leave3, E::Elapsed | E::Failed) => S::Down,
             (S::Identify | S::OpenSvc | S::Start2 | S::Start3 | S::Start4, E::Failed) => S::Down,
             (_, E::Restart) => S::Down,

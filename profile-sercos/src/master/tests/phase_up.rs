@@ -146,6 +146,36 @@ fn down_and_up_again() {
     }
 }
 
+/// In every cycle of the way up to CP4, and so in every state on it, the one in which CP0 is left included.
+#[test]
+fn a_master_can_be_stopped_at_any_moment() {
+    let mut rig = Rig::of(&[1, 2]);
+    rig.auto_proceed = true;
+    rig.master.set_target_phase(Phase::CP4);
+    let mut cycles = 0;
+    while rig.master.state() != State::Cp4 {
+        rig.cycles(1);
+        cycles += 1;
+    }
+    let mut seen = Vec::new();
+    for cycles in 0..cycles {
+        let mut rig = Rig::of(&[1, 2]);
+        rig.auto_proceed = true;
+        rig.master.set_target_phase(Phase::CP4);
+        rig.cycles(cycles);
+        let state = rig.master.state();
+        if !seen.contains(&state) {
+            seen.push(state);
+        }
+        rig.master.stop();
+        rig.cycles(500);
+        assert_eq!((rig.master.state(), rig.master.phase()), (State::Nrt, None), "{state:?} after {cycles}");
+    }
+    for state in [State::Scan, State::Leave0, State::Silence1, State::Leave1, State::Leave2, State::Leave3] {
+        assert!(seen.contains(&state), "{state:?} not among {seen:?}");
+    }
+}
+
 #[test]
 fn a_reading_that_was_cut_off_is_made_again() {
     for state in [State::Read2, State::Connect2, State::Write2, State::Check2] {
