@@ -1,7 +1,8 @@
 //! Files that are replaced as a whole.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
 /// Writes a new file and puts it in the place of the old one, so that a loss of power leaves the old one or the new one.
@@ -11,7 +12,17 @@ pub(crate) fn replace_file(path: &Path, text: &str) -> io::Result<()> {
 
 /// The same with bytes.
 pub(crate) fn replace_with(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    replace_on(&mut Host, path, bytes)
+    replace_on(&mut Host { is_private: false }, path, bytes)
+}
+
+/// The same with a file that only this user can read.
+pub(crate) fn replace_private(path: &Path, text: &str) -> io::Result<()> {
+    replace_on(&mut Host { is_private: true }, path, text.as_bytes())
+}
+
+/// Creates a file that only this user can read, and that was not there before.
+pub(crate) fn create_private(path: &Path) -> io::Result<File> {
+    OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)
 }
 
 /// The steps of a replacement, so that a test can cut the power between any two of them.
@@ -50,13 +61,20 @@ fn new_name(path: &Path) -> PathBuf {
 }
 
 /// The file system of the host.
-struct Host;
+struct Host {
+    is_private: bool,
+}
 
 impl Medium for Host {
     type File = File;
 
     fn create(&mut self, path: &Path) -> io::Result<File> {
-        File::create(path)
+        if !self.is_private {
+            return File::create(path);
+        }
+        // What was left by a replacement that did not end may be for others to read.
+        let _ = std::fs::remove_file(path);
+        create_private(path)
     }
 
     fn write(&mut self, file: &mut File, bytes: &[u8]) -> io::Result<()> {

@@ -1,16 +1,15 @@
 //! `axisbridge token`: the secret that lets people control axes over HTTP. The file has its hash alone.
 
-use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead as _, ErrorKind, IsTerminal as _, Read as _, Write as _};
 use std::os::fd::AsFd as _;
-use std::os::unix::fs::OpenOptionsExt as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use rustix::termios::{LocalModes, OptionalActions, tcgetattr, tcsetattr};
 
 use super::{CliError, TokenArguments, print};
 use crate::http::{hash, random_secret};
+use crate::replace_file::{create_private, replace_private};
 
 /// Longest line that is read.
 const LINE_MAX: u64 = 1_024;
@@ -81,19 +80,12 @@ fn write(path: &Path, text: &str, replaces: bool) -> Result<(), CliError> {
         ErrorKind::AlreadyExists => exists(path),
         _ => format!("cannot write {}: {error}", path.display()),
     };
-    let open = |path: &Path| -> io::Result<File> {
-        OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)
+    let written = if replaces {
+        replace_private(path, text)
+    } else {
+        create_private(path)
+            .and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()))
     };
-    let fill = |mut file: File| file.write_all(text.as_bytes()).and_then(|()| file.sync_all());
-    if !replaces {
-        return Ok(open(path).and_then(fill).map_err(failed)?);
-    }
-    let mut new = path.as_os_str().to_owned();
-    new.push(".new");
-    let new = PathBuf::from(new);
-    // What a command that was killed has left.
-    let _ = std::fs::remove_file(&new);
-    let written = open(&new).and_then(fill).and_then(|()| std::fs::rename(&new, path));
     Ok(written.map_err(failed)?)
 }
 

@@ -233,13 +233,13 @@ impl Loader<'_> {
     }
 }
 
-/// Whether the gateway sets an object itself where it maps the PDOs, or whether writing it would undo what the box needs.
+/// Whether the gateway sets an object itself where it maps the PDOs, or whether writing it would undo what the gateway needs.
 #[must_use]
 pub fn is_set_by_gateway(index: u16) -> bool {
     is_own(index, false)
 }
 
-/// Whether the gateway sets an object itself, or whether writing it would undo what the box needs.
+/// Whether the gateway sets an object itself, or whether writing it would undo what the gateway needs.
 fn is_own(index: u16, keeps_mapping: bool) -> bool {
     match index {
         // SYNC, guarding, storing and restoring, EMCY, heartbeats, the stamp; programs; network management.

@@ -4,8 +4,9 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use axum::extract::{Extension, State};
+use axum::extract::{Extension, FromRequestParts, State};
 use axum::http::header::{AUTHORIZATION, RETRY_AFTER, WWW_AUTHENTICATE};
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{MethodRouter, get};
@@ -130,26 +131,31 @@ pub(super) fn refuse(code: StatusCode, text: impl std::fmt::Display) -> Response
     (code, typed(TEXT, format!("{text}\n"))).into_response()
 }
 
-/// The gate, for requests of the page itself and of programs.
-///
-/// # Errors
-/// There is none, or the request is from another site.
-pub(super) fn enter<'s>(
-    sources: &'s Sources,
-    from: Remote,
-    headers: &HeaderMap,
-) -> Result<&'s Gate, Box<Response>> {
-    let Some(gate) = &sources.gate else {
-        let text = "nobody controls axes over HTTP: `[http]` of the configuration has no `token`";
-        return Err(Box::new(refuse(StatusCode::FORBIDDEN, text)));
-    };
-    same_origin(headers).map_err(|error| {
-        if gate.admits_line(from.0) {
-            tracing::warn!(from = %from.0, "HTTP control refused: {error}");
-        }
-        Box::new(refuse(StatusCode::FORBIDDEN, error))
-    })?;
-    Ok(gate)
+/// A request of the page itself or of a program, where axes can be controlled.
+pub(super) struct Entered {
+    pub gate: Arc<Gate>,
+    pub from: SocketAddr,
+}
+
+impl FromRequestParts<Sources> for Entered {
+    /// There is no gate, or the request is from another site.
+    type Rejection = Response;
+
+    async fn from_request_parts(parts: &mut Parts, sources: &Sources) -> Result<Self, Response> {
+        let remote = Extension::<Remote>::from_request_parts(parts, sources).await;
+        let Extension(Remote(from)) = remote.map_err(|rejection| rejection.into_response())?;
+        let Some(gate) = &sources.gate else {
+            let text = "nobody controls axes over HTTP: `[http]` of the configuration has no `token`";
+            return Err(refuse(StatusCode::FORBIDDEN, text));
+        };
+        same_origin(&parts.headers).map_err(|error| {
+            if gate.admits_line(from) {
+                tracing::warn!(%from, "HTTP control refused: {error}");
+            }
+            refuse(StatusCode::FORBIDDEN, error)
+        })?;
+        Ok(Self { gate: Arc::clone(gate), from })
+    }
 }
 
 /// Nobody that is known.
@@ -162,19 +168,11 @@ async fn offer(State(sources): State<Sources>) -> Response {
     typed(JSON, serde_json::to_string(&offer).unwrap_or_default())
 }
 
-async fn open(
-    State(sources): State<Sources>,
-    Extension(from): Extension<Remote>,
-    headers: HeaderMap,
-) -> Response {
-    let gate = match enter(&sources, from, &headers) {
-        Ok(gate) => gate,
-        Err(response) => return *response,
-    };
+async fn open(Entered { gate, from }: Entered, headers: HeaderMap) -> Response {
     let Some(secret) = bearer(&headers).map(str::to_owned) else {
         return unknown("expected `Authorization: Bearer TOKEN`");
     };
-    let host = from.0.ip();
+    let host = from.ip();
     let later = |code, seconds: u64, text: String| {
         ([(RETRY_AFTER, seconds.to_string())], refuse(code, text)).into_response()
     };
@@ -185,8 +183,8 @@ async fn open(
     if let Err(wait) = gate.attempts.take(Instant::now(), host) {
         let seconds = wait.saturating_add(Duration::from_millis(999)).as_secs();
         let text = format!("too many attempts: the next one is in {seconds} s");
-        if gate.admits_line(from.0) {
-            tracing::warn!(from = %from.0, "HTTP control refused: {text}");
+        if gate.admits_line(from) {
+            tracing::warn!(%from, "HTTP control refused: {text}");
         }
         return later(StatusCode::TOO_MANY_REQUESTS, seconds, text);
     }
@@ -199,15 +197,15 @@ async fn open(
         accepted
     };
     if !tokio::task::spawn_blocking(verify).await.unwrap_or(false) {
-        if gate.admits_line(from.0) {
-            tracing::warn!(from = %from.0, "HTTP control refused: the token is wrong");
+        if gate.admits_line(from) {
+            tracing::warn!(%from, "HTTP control refused: the token is wrong");
         }
         return unknown("the token is wrong");
     }
     gate.attempts.forget(host);
     match gate.sessions.open(Instant::now(), host) {
         Ok(session) => {
-            tracing::info!(from = %from.0, "HTTP control: session opened with the token");
+            tracing::info!(%from, "HTTP control: session opened with the token");
             let opened = Opened { session, idle_s: IDLE.as_secs() };
             typed(JSON, serde_json::to_string(&opened).unwrap_or_default())
         }
@@ -215,20 +213,12 @@ async fn open(
     }
 }
 
-async fn close(
-    State(sources): State<Sources>,
-    Extension(from): Extension<Remote>,
-    headers: HeaderMap,
-) -> Response {
-    let gate = match enter(&sources, from, &headers) {
-        Ok(gate) => gate,
-        Err(response) => return *response,
-    };
-    let closed = bearer(&headers).is_some_and(|key| gate.sessions.close(Instant::now(), from.0.ip(), key));
+async fn close(Entered { gate, from }: Entered, headers: HeaderMap) -> Response {
+    let closed = bearer(&headers).is_some_and(|key| gate.sessions.close(Instant::now(), from.ip(), key));
     if !closed {
         return unknown("there is no such session");
     }
-    tracing::info!(from = %from.0, "HTTP control: session ended");
+    tracing::info!(%from, "HTTP control: session ended");
     StatusCode::NO_CONTENT.into_response()
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::protocol;
 use crate::config::{Axis, Config};
 use crate::engine::Engine;
 use crate::engine::build::scaling;
@@ -76,12 +77,8 @@ impl Attributes {
         let Some(program) = self.programs.get(axis) else {
             return format!("error attributes {name} unanswered: the drive is not commissioned\n");
         };
-        let mut text = String::new();
         let truths = self.mapping.truths(table, &program);
-        for truth in &truths {
-            let line = serde_json::to_string(&AttributeLine::from(truth)).unwrap_or_default();
-            let _ = writeln!(text, "attribute {line}");
-        }
+        let mut text = protocol::rows("attribute", truths.iter().map(AttributeLine::from));
         let _ = writeln!(text, "ok attributes {}", truths.len());
         text
     }

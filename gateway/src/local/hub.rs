@@ -69,10 +69,7 @@ impl Shared {
     /// Lines of the log, each as an object.
     pub(super) fn log(&self, query: &LogQuery) -> String {
         let Selection { events, next, missed } = self.sources.histories.events.select(query);
-        let mut text = String::new();
-        for event in &events {
-            let _ = writeln!(text, "event {}", serde_json::to_string(&**event).unwrap_or_default());
-        }
+        let mut text = protocol::rows("event", events.iter().map(|event| &**event));
         let _ = writeln!(text, "ok log {} next={next} missed={missed}", events.len());
         text
     }
@@ -81,10 +78,7 @@ impl Shared {
     pub(super) fn faults(&self, axis: Option<usize>) -> String {
         let name = axis.and_then(|axis| self.names.get(axis)).map(String::as_str);
         let records = self.sources.histories.faults.list(name);
-        let mut text = String::new();
-        for record in &records {
-            let _ = writeln!(text, "fault {}", serde_json::to_string(record).unwrap_or_default());
-        }
+        let mut text = protocol::rows("fault", &records);
         let _ = writeln!(text, "ok faults {}", records.len());
         text
     }
@@ -93,10 +87,7 @@ impl Shared {
     pub(super) fn contacts(&self) -> String {
         let recording = self.sources.recording.as_ref();
         let contacts = recording.map(|recording| recording.contacts()).unwrap_or_default();
-        let mut text = String::new();
-        for contact in &contacts {
-            let _ = writeln!(text, "contact {}", serde_json::to_string(contact).unwrap_or_default());
-        }
+        let mut text = protocol::rows("contact", &contacts);
         let _ = writeln!(text, "ok contacts {}", contacts.len());
         text
     }

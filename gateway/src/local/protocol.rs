@@ -15,6 +15,7 @@ use profile_generic::parameter::{Access, Parameter};
 use profile_generic::quantity::{Acceleration, Position, Velocity};
 use profile_generic::ratio::{Ratio, Rounding};
 use profile_generic::time::DurationNs;
+use serde::Serialize;
 
 use super::drive::job::{Act, Ask, Listing};
 use crate::config::{AxisKind, LogLevel};
@@ -626,6 +627,16 @@ pub fn list(names: &[String], state: impl Fn(usize) -> String) -> String {
     }
     let _ = writeln!(text, "ok axes {}", names.len());
     text
+}
+
+/// Lines of a reply, each a word and an object.
+#[must_use]
+pub fn rows<T: Serialize>(word: &str, rows: impl IntoIterator<Item = T>) -> String {
+    rows.into_iter().fold(String::new(), |mut text, row| {
+        // The objects have texts, numbers and lists, and nothing that JSON does not know.
+        let _ = writeln!(text, "{word} {}", serde_json::to_string(&row).unwrap_or_default());
+        text
+    })
 }
 
 /// The reply to `parameters`: a line for each of the overlays, and one that ends the list.

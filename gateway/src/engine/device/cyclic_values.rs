@@ -119,16 +119,6 @@ impl CyclicValues {
         true
     }
 
-    /// The attributes that a drive does not let be in write lists: nobody has them.
-    pub fn not_written<'a>(
-        mapping: &'a Mapping,
-        attributes: &'a AttributeTable,
-        program: &'a DriveProgram,
-    ) -> impl Iterator<Item = u16> + 'a {
-        let entries = attributes.entries().iter();
-        entries.filter(|entry| !mapping.has(entry, program)).map(|entry| entry.id)
-    }
-
     /// Whether settings are still to be read that cyclic lists may need.
     pub fn is_reading(&self) -> bool {
         self.asked.is_some() || self.settings.iter().any(|setting| setting.due)

@@ -12,7 +12,6 @@ use profile_generic::time_base::TimeBase;
 
 use super::access::{Accessed, Accesses};
 use super::axis::CipAxis;
-use super::cyclic_values::CyclicValues;
 use super::reactions;
 use super::scaling::{Scaling, signal_octets};
 use super::stopping::{Settings, StopDefaults, Stopping};
@@ -145,8 +144,8 @@ impl Member {
             let attributes = self.scaling.attributes();
             let refused = computed.commission(mapping, attributes, (axis.programs(), program));
             device.set_not_cyclically_read(place, refused);
-            let refused = CyclicValues::not_written(mapping, attributes, program);
-            device.set_not_cyclically_written(place, refused);
+            let nobodys = attributes.entries().iter().filter(|entry| !mapping.has(entry, program));
+            device.set_not_cyclically_written(place, nobodys.map(|entry| entry.id));
         }
         let (settings, sequence) = self.stopping.settings(Settings {
             rows: &mapping.cip.sequence,

@@ -19,7 +19,6 @@ use std::time::Duration;
 
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, WebSocketUpgrade};
-use axum::extract::{Extension, State};
 use axum::http::header::{RETRY_AFTER, SEC_WEBSOCKET_PROTOCOL};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse as _, Response};
@@ -29,8 +28,7 @@ use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until, timeout, t
 
 use self::beats::{Age, Beats};
 use super::access::Lease;
-use super::login::{Remote, bearer, enter, refuse, unknown};
-use super::routes::Sources;
+use super::login::{Entered, bearer, refuse, unknown};
 use crate::engine::local::Order;
 use crate::local::protocol::{BadRequest, LINE_MAX, Request};
 use crate::local::{Session, Taken, Who};
@@ -81,18 +79,13 @@ pub(super) fn describe() -> Value {
 
 /// Begins a stream.
 pub(super) async fn control(
-    State(sources): State<Sources>,
-    Extension(from): Extension<Remote>,
+    Entered { gate, from }: Entered,
     headers: HeaderMap,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Response {
-    let gate = match enter(&sources, from, &headers) {
-        Ok(gate) => gate,
-        Err(response) => return *response,
-    };
     let key = bearer(&headers).or_else(|| of_protocols(&headers));
     let now = std::time::Instant::now();
-    let Some(lease) = key.and_then(|key| gate.sessions.lease(now, from.0.ip(), key)) else {
+    let Some(lease) = key.and_then(|key| gate.sessions.lease(now, from.ip(), key)) else {
         return unknown("there is no such session: `POST /api/v1/session` opens one");
     };
     let Ok(upgrade) = upgrade else {
@@ -105,11 +98,11 @@ pub(super) async fn control(
     let door = gate.door.clone();
     let upgrade = upgrade.protocols([PROTOCOL]).max_message_size(MESSAGE_MAX).max_frame_size(MESSAGE_MAX);
     upgrade.on_upgrade(async move |socket| {
-        let session = door.enter(Who::Host(from.0)).limit_jogs(JOG);
+        let session = door.enter(Who::Host(from)).limit_jogs(JOG);
         let client = session.id();
-        tracing::info!(client, from = %from.0, "HTTP control: client connected");
+        tracing::info!(client, %from, "HTTP control: client connected");
         let end = serve(socket, session, lease).await;
-        tracing::info!(client, from = %from.0, why = end.why(), "HTTP control: client disconnected");
+        tracing::info!(client, %from, why = end.why(), "HTTP control: client disconnected");
         drop(place);
     })
 }
