@@ -80,6 +80,9 @@ def python(path):
     spec.loader.exec_module(library)
     values = [{"control": 0x0102 + place, "velocity": -(1 << 24) - place} for place in range(len(library.AXES))]
     known = library.AxisOutput._fields
+    if "speed_reference" in known:
+        # Bits in a byte.
+        values = [{"control": one["control"] & 0xFF} for one in values]
     outputs = [library.AxisOutput(**{name: value for name, value in one.items() if name in known}) for one in values]
     packed = library.pack_output(outputs)
     shown = library.unpack_input(bytes(at % 251 for at in range(library.INPUT_BYTES)))

@@ -77,6 +77,14 @@ pub struct Axis {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Nameplate(pub Vec<(Parameter, i64)>);
 
+impl Nameplate {
+    /// What it says of a parameter, in the unit of the parameter.
+    #[must_use]
+    pub fn value(&self, parameter: Parameter) -> Option<i64> {
+        self.0.iter().find(|(known, _)| *known == parameter).map(|(_, value)| *value)
+    }
+}
+
 /// Limits of an axis that the box holds; `None` leaves them to the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {

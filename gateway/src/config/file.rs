@@ -238,12 +238,13 @@ pub struct DeviceTable {
     pub assembly: Option<Spanned<AssemblyTable>>,
 }
 
-/// `[device.assembly]`. Either `layout`, or `output` and `input`.
+/// `[device.assembly]`. Either `layout`, or `output` and `input`. `drive_mode` and `torque_scale` go with the layouts `"speed-torque"` and
+/// `"speed-torque-basic"` only.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AssemblyTable {
-    /// A shipped layout: `"position"`, `"motion"`, `"speed"`, `"speed-basic"` or `"mixed"`. Default: `"position"`, unless fields are
-    /// given.
+    /// A shipped layout: `"position"`, `"motion"`, `"speed"`, `"speed-basic"`, `"speed-torque"`, `"speed-torque-basic"` or `"mixed"`.
+    /// Default: `"position"`, unless fields are given.
     #[schemars(transform = form::word(&check::assembly::LAYOUTS))]
     pub layout: Option<Spanned<String>>,
     /// Fields that each axis has in the output assembly, in their order; with `control` and `mode`.
@@ -252,6 +253,13 @@ pub struct AssemblyTable {
     /// Fields that each axis has in the input assembly, in their order; with `status`.
     #[schemars(transform = form::list_of(&check::assembly::input_fields()))]
     pub input: Option<Spanned<Vec<Spanned<String>>>>,
+    /// Which reference of `"speed-torque"` and `"speed-torque-basic"` moves the axis: `"speed"` or `"torque"`. To be given with these
+    /// layouts.
+    #[schemars(transform = form::word(&check::assembly::drive_modes()))]
+    pub drive_mode: Option<Spanned<String>>,
+    /// TorqueScale, -15 to 15: torque is in Nm / 2^TorqueScale. Default: 0.
+    #[schemars(range(min = -15, max = 15))]
+    pub torque_scale: Option<Spanned<i64>>,
 }
 
 /// `identity` of a `[[device]]`. The device type follows from the axes: 47, CIP Motion Encoder, if all of them are encoders; 48, CIP Motion

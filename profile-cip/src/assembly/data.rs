@@ -7,10 +7,8 @@ use profile_generic::time::SystemTime;
 
 use super::field::{InputField, OutputField};
 use super::handshake::{Control, Refusal, Status};
-use super::layout::{Assemblies, Layout, SPEED_LEN};
-use crate::devicenet::wire::speed::{
-    Assembly, SpeedActual, SpeedCommand, SpeedControl, SpeedStatus, SupervisorState,
-};
+use super::layout::{Assemblies, DriveMode, Layout, SPEED_LEN_MAX, TORQUE_SCALE_MAX};
+use crate::devicenet::wire::speed::{SpeedActual, SpeedCommand, SpeedControl, SpeedStatus, SupervisorState};
 use crate::wire::{Reader, Writer};
 
 /// Nanounits of a revolution or millimetre.
@@ -18,11 +16,16 @@ const NANO: i128 = 1_000_000_000;
 /// Of a torque in thousandths of the rated one, in the units of [`Torque`].
 const TORQUE_STEP: i64 = 1_000;
 
-/// How many counts make a revolution or millimetre.
+/// Units of [`Torque`], and micronewtonmetres, in a whole.
+const MILLION: i128 = 1_000_000;
+
+/// What the values of an axis are counted in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scale {
-    /// Above zero.
+    /// Counts that make a revolution or millimetre, above zero.
     pub counts_per_unit: u32,
+    /// Rated torque of the motor, uNm; 0 where it is not known, and no torque can be in Nm.
+    pub rated_torque: i64,
 }
 
 impl Scale {
@@ -37,10 +40,39 @@ impl Scale {
     pub fn counts(self, nano: i64) -> Option<i64> {
         i64::try_from(rounded(i128::from(nano) * i128::from(self.counts_per_unit), NANO)).ok()
     }
+
+    /// The torque that is so many Nm / 2^`torque_scale`, rounded to the nearest; `None` beyond 64 bits, or where the rated torque is not
+    /// known.
+    #[must_use]
+    pub fn torque(self, units: i16, torque_scale: i8) -> Option<Torque> {
+        let rated = i128::from(self.rated_torque);
+        let parts = i128::from(units) * MILLION * MILLION;
+        let (parts, divisor) = shifted(parts, rated, torque_scale);
+        (rated > 0).then(|| i64::try_from(rounded(parts, divisor)).ok().map(Torque)).flatten()
+    }
+
+    /// A torque in Nm / 2^`torque_scale`, rounded to the nearest and held at the ends of 16 bits; 0 where the rated torque is not known.
+    #[must_use]
+    pub fn torque_units(self, torque: Torque, torque_scale: i8) -> i16 {
+        let torque = i128::from(torque.get()) * i128::from(self.rated_torque.max(0));
+        let (divisor, torque) = shifted(MILLION * MILLION, torque, torque_scale);
+        held(rounded(torque, divisor))
+    }
+}
+
+/// A value times 2^-`places`, as two factors of which the other one divides.
+fn shifted(value: i128, divisor: i128, places: i8) -> (i128, i128) {
+    let by = 1 << u32::from(places.unsigned_abs().min(TORQUE_SCALE_MAX.unsigned_abs()));
+    if places < 0 { (value.saturating_mul(by), divisor) } else { (value, divisor.saturating_mul(by)) }
+}
+
+/// A value in 16 bits, held at its ends.
+fn held(value: i128) -> i16 {
+    i16::try_from(value).unwrap_or(if value < 0 { i16::MIN } else { i16::MAX })
 }
 
 fn rounded(number: i128, divisor: i128) -> i128 {
-    (number + number.signum() * (divisor / 2)) / divisor
+    number.saturating_add(number.signum() * (divisor / 2)) / divisor
 }
 
 /// Data that do not have the bytes of the assembly.
@@ -110,7 +142,7 @@ pub struct AxisInput {
     pub age_us: u32,
     /// Instant of the actual values; 0 when it is not known.
     pub time_stamp: SystemTime,
-    /// Whether the velocity set-point is reached.
+    /// Whether the velocity or torque that is wanted is reached.
     pub at_reference: bool,
 }
 
@@ -154,10 +186,15 @@ impl Assemblies {
                 }
                 Ok(values)
             }
-            Layout::Speed { extended } => {
-                let kind = Assembly(if *extended { 21 } else { 20 });
-                let command = SpeedCommand::parse(kind, bytes).map_err(|_| error)?;
-                Ok(of_speed(command, *extended))
+            Layout::Speed { output, mode, torque_scale } => {
+                let command = SpeedCommand::parse(*output, bytes).map_err(|_| error)?;
+                let axis = of_speed(command, output.is_extended());
+                Ok(match mode {
+                    DriveMode::Speed => axis,
+                    DriveMode::Torque => {
+                        of_torque(axis, command, scale.torque(command.torque, *torque_scale))
+                    }
+                })
             }
         }
     }
@@ -195,11 +232,12 @@ impl Assemblies {
                 }
                 Ok(())
             }
-            Layout::Speed { extended } => {
-                let kind = Assembly(if *extended { 71 } else { 70 });
-                let mut octets = [0; SPEED_LEN];
-                to_speed(values, *extended).emit(kind, &mut octets).map_err(|_| error)?;
-                bytes.copy_from_slice(&octets);
+            Layout::Speed { output, torque_scale, .. } => {
+                let kind = output.status().ok_or(error)?;
+                let mut octets = [0; SPEED_LEN_MAX];
+                let torque = scale.torque_units(values.torque, *torque_scale);
+                let len = to_speed(values, torque).emit(kind, &mut octets).map_err(|_| error)?;
+                bytes.copy_from_slice(octets.get(..len).ok_or(error)?);
                 Ok(())
             }
         }
@@ -309,7 +347,10 @@ fn signed(bytes: &[u8]) -> i64 {
 /// Mode in which the velocity is followed on the ramp of the gateway.
 const VELOCITY_MODE: u8 = 2;
 
-/// Without control and reference from the network, assembly 21 has no say over the drive.
+/// Mode in which each datagram has the torque.
+const TORQUE_MODE: u8 = 5;
+
+/// Without control and reference from the network, assemblies 21 and 23 have no say over the drive.
 fn of_speed(command: SpeedCommand, extended: bool) -> AxisOutput {
     let SpeedCommand { control, speed, .. } = command;
     let from_network = !extended || control.contains(SpeedControl::NET_CONTROL | SpeedControl::NET_REFERENCE);
@@ -330,10 +371,23 @@ fn of_speed(command: SpeedCommand, extended: bool) -> AxisOutput {
     }
 }
 
-fn to_speed(values: &AxisInput, extended: bool) -> SpeedActual {
+/// In torque control the direction is that of the torque, and the speed reference does not count.
+fn of_torque(axis: AxisOutput, command: SpeedCommand, torque: Option<Torque>) -> AxisOutput {
+    let reverse = command.control.contains(SpeedControl::RUN_REVERSE);
+    let directed = torque.map_or(Torque::ZERO, |torque| if reverse { Torque(-torque.get()) } else { torque });
+    AxisOutput {
+        mode: TORQUE_MODE,
+        velocity: None,
+        torque: Some(directed),
+        refusal: axis.refusal.or(torque.is_none().then_some(Refusal::VALUE)),
+        ..axis
+    }
+}
+
+fn to_speed(values: &AxisInput, torque: i16) -> SpeedActual {
     let has = |status| values.status.contains(status);
     let rpm = rounded(i128::from(values.velocity.get()) * 60, NANO);
-    let speed = i16::try_from(rpm).unwrap_or(if rpm < 0 { i16::MIN } else { i16::MAX });
+    let speed = held(rpm);
     let enabled = has(Status::ENABLED);
     let mut status = SpeedStatus::empty();
     status.set(SpeedStatus::FAULTED, has(Status::FAULT));
@@ -351,5 +405,5 @@ fn to_speed(values: &AxisInput, extended: bool) -> SpeedActual {
         (.., true) => SupervisorState::READY,
         _ => SupervisorState::NOT_READY,
     };
-    SpeedActual { status, state: if extended { state } else { SupervisorState(0) }, speed, torque: 0 }
+    SpeedActual { status, state, speed, torque }
 }

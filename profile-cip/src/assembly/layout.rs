@@ -4,6 +4,7 @@ use core::fmt;
 
 use super::RUN_IDLE_LEN;
 use super::field::{InputField, OutputField};
+use crate::devicenet::wire::speed::{Assembly, DRIVE_MODE_SPEED, DRIVE_MODE_TORQUE};
 use crate::wire::class1::SEQUENCE_COUNT_LEN;
 
 /// Most bytes of an assembly: with its headers it fits one Ethernet frame.
@@ -20,8 +21,44 @@ pub const INPUT_ONLY_POINT: u16 = 152;
 /// Connection point of the heartbeat of a listen-only connection.
 pub const LISTEN_ONLY_POINT: u16 = 153;
 
-/// The assemblies of the AC/DC drive profile: bytes of each of them that is served.
-pub const SPEED_LEN: usize = 4;
+/// Most bytes of an assembly of the AC/DC drive profile.
+pub const SPEED_LEN_MAX: usize = 6;
+
+/// `TorqueScale` either way: the unit of torque is from 2^-15 Nm to 2^15 Nm.
+pub const TORQUE_SCALE_MAX: i8 = 15;
+
+/// Which of the two references of an assembly with speed and torque moves the axis: `DriveMode` of the AC/DC Drive object.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DriveMode {
+    /// The speed; the torque reference has no effect.
+    #[default]
+    Speed,
+    /// The torque; the speed reference has no effect.
+    Torque,
+}
+
+impl DriveMode {
+    /// Every mode by its name in configurations.
+    pub const NAMED: [(&str, Self); 2] = [("speed", Self::Speed), ("torque", Self::Torque)];
+
+    /// The name in configurations and listings.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Speed => "speed",
+            Self::Torque => "torque",
+        }
+    }
+
+    /// Attribute 6 of the AC/DC Drive object.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Speed => DRIVE_MODE_SPEED,
+            Self::Torque => DRIVE_MODE_TORQUE,
+        }
+    }
+}
 
 /// What the axes of a device exchange.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,10 +72,14 @@ pub enum Layout {
         /// The mode of a layout without such a field.
         mode: Option<u8>,
     },
-    /// Basic (20 and 70) or extended (21 and 71) speed control of the AC/DC drive profile, for one axis.
+    /// Assemblies of the AC/DC drive profile, for one axis.
     Speed {
-        /// The extended ones.
-        extended: bool,
+        /// The output assembly, 20 to 23; the input assembly goes with it.
+        output: Assembly,
+        /// The reference that moves the axis.
+        mode: DriveMode,
+        /// `TorqueScale`: torque is in Nm / 2^`torque_scale`; up to [`TORQUE_SCALE_MAX`] either way.
+        torque_scale: i8,
     },
 }
 
@@ -93,9 +134,30 @@ impl fmt::Display for LayoutError {
 impl std::error::Error for LayoutError {}
 
 /// Names of the shipped layouts.
-pub const SHIPPED: [&str; 5] = ["position", "motion", "speed", "speed-basic", "mixed"];
+pub const SHIPPED: [&str; 7] =
+    ["position", "motion", "speed", "speed-basic", "speed-torque", "speed-torque-basic", "mixed"];
 
 impl Layout {
+    /// Assemblies of the AC/DC drive profile, in speed control.
+    const fn of_profile(output: Assembly) -> Self {
+        Self::Speed { output, mode: DriveMode::Speed, torque_scale: 0 }
+    }
+
+    /// Whether it has a torque in Nm: assemblies 22 and 72, 23 and 73.
+    #[must_use]
+    pub const fn has_torque_in_nm(&self) -> bool {
+        matches!(self, Self::Speed { output, .. } if output.has_torque())
+    }
+
+    /// The same assemblies of the AC/DC drive profile with this mode and scale; other layouts as they are.
+    #[must_use]
+    pub fn with_torque(self, mode: DriveMode, torque_scale: i8) -> Self {
+        match self {
+            Self::Speed { output, .. } if output.has_torque() => Self::Speed { output, mode, torque_scale },
+            other => other,
+        }
+    }
+
     /// The shipped layout with this name.
     #[must_use]
     pub fn shipped(name: &str) -> Option<Self> {
@@ -148,8 +210,10 @@ impl Layout {
                 ]),
                 mode: None,
             },
-            "speed" => Self::Speed { extended: true },
-            "speed-basic" => Self::Speed { extended: false },
+            "speed" => Self::of_profile(Assembly::EXTENDED_SPEED_CONTROL),
+            "speed-basic" => Self::of_profile(Assembly::BASIC_SPEED_CONTROL),
+            "speed-torque" => Self::of_profile(Assembly::EXTENDED_TORQUE_CONTROL),
+            "speed-torque-basic" => Self::of_profile(Assembly::BASIC_TORQUE_CONTROL),
             _ => return None,
         })
     }
@@ -187,7 +251,7 @@ impl Layout {
     pub fn output_len(&self) -> usize {
         match self {
             Self::Fields { output, .. } => output.iter().map(|field| field.size()).sum(),
-            Self::Speed { .. } => SPEED_LEN,
+            Self::Speed { output, .. } => output.buffer_len(),
         }
     }
 
@@ -196,7 +260,7 @@ impl Layout {
     pub fn input_len(&self) -> usize {
         match self {
             Self::Fields { input, .. } => input.iter().map(|field| field.size()).sum(),
-            Self::Speed { .. } => SPEED_LEN,
+            Self::Speed { output, .. } => output.buffer_len(),
         }
     }
 }
@@ -272,13 +336,7 @@ impl Assemblies {
     pub const fn output_point(&self) -> u16 {
         match self.layout {
             Layout::Fields { .. } => OUTPUT_POINT,
-            Layout::Speed { extended } => {
-                if extended {
-                    21
-                } else {
-                    20
-                }
-            }
+            Layout::Speed { output, .. } => u16::from_le_bytes([output.0, 0]),
         }
     }
 
@@ -287,13 +345,8 @@ impl Assemblies {
     pub const fn input_point(&self) -> u16 {
         match self.layout {
             Layout::Fields { .. } => INPUT_POINT,
-            Layout::Speed { extended } => {
-                if extended {
-                    71
-                } else {
-                    70
-                }
-            }
+            // The input assembly of an output assembly is that many above it.
+            Layout::Speed { output, .. } => u16::from_le_bytes([output.0 + 50, 0]),
         }
     }
 
@@ -318,7 +371,7 @@ impl Assemblies {
                     |field: &OutputField| (field.size(), field.name(), field.kind(), field.description());
                 place(self.axes, &output.iter().map(one).collect::<Vec<_>>())
             }
-            Layout::Speed { .. } => place(1, &SPEED_OUTPUT),
+            Layout::Speed { output, .. } => place(1, with_torque(&SPEED_OUTPUT, *output)),
         }
     }
 
@@ -331,7 +384,7 @@ impl Assemblies {
                     |field: &InputField| (field.size(), field.name(), field.kind(), field.description());
                 place(self.axes, &input.iter().map(one).collect::<Vec<_>>())
             }
-            Layout::Speed { .. } => place(1, &SPEED_INPUT),
+            Layout::Speed { output, .. } => place(1, with_torque(&SPEED_INPUT, *output)),
         }
     }
 }
@@ -339,7 +392,12 @@ impl Assemblies {
 /// Length, name, type and description of a field.
 type Row = (usize, &'static str, &'static str, &'static str);
 
-const SPEED_OUTPUT: [Row; 3] = [
+/// The rows of an assembly of the AC/DC drive profile: the last one is the torque.
+fn with_torque(rows: &[Row; 4], assembly: Assembly) -> &[Row] {
+    if assembly.has_torque() { rows } else { &rows[..3] }
+}
+
+const SPEED_OUTPUT: [Row; 4] = [
     (
         1,
         "control",
@@ -348,17 +406,19 @@ const SPEED_OUTPUT: [Row; 3] = [
     ),
     (1, "pad_8", "USINT", "Not used."),
     (2, "speed_reference", "INT", "Speed, rpm."),
+    (2, "torque_reference", "INT", "Torque, Nm / 2^TorqueScale."),
 ];
 
-const SPEED_INPUT: [Row; 3] = [
+const SPEED_INPUT: [Row; 4] = [
     (
         1,
         "status",
         "BYTE",
         "Bits of the AC/DC drive profile: 0 faulted, 1 warning, 2 running forward, 3 running reverse, 4 ready, 5 control from network, 6 reference from network, 7 at reference.",
     ),
-    (1, "drive_state", "USINT", "State of the Control Supervisor; 0 in assembly 70."),
+    (1, "drive_state", "USINT", "State of the Control Supervisor; 0 in assemblies 70 and 72."),
     (2, "actual_speed", "INT", "Speed, rpm."),
+    (2, "actual_torque", "INT", "Torque, Nm / 2^TorqueScale."),
 ];
 
 fn place(axes: usize, rows: &[Row]) -> Vec<Placed> {

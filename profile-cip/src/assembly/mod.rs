@@ -9,8 +9,8 @@
 //!
 //! | connection point | what it is |
 //! |---|---|
-//! | 150 (20, 21) | output assembly: from the controller |
-//! | 100 (70, 71) | input assembly: to the controller |
+//! | 150 (20 to 23) | output assembly: from the controller |
+//! | 100 (70 to 73) | input assembly: to the controller |
 //! | 151 | configuration assembly, without data |
 //! | 152 | heartbeat of an input-only connection |
 //! | 153 | heartbeat of a listen-only connection |
@@ -25,7 +25,7 @@ pub mod layout;
 pub use self::data::{AxisInput, AxisOutput, Scale, SizeError};
 pub use self::field::{InputField, OutputField};
 pub use self::handshake::{Control, Handshake, Link, Reaction, Refusal, State};
-pub use self::layout::{Assemblies, Layout, LayoutError, Placed};
+pub use self::layout::{Assemblies, DriveMode, Layout, LayoutError, Placed};
 
 /// Bytes of the run/idle header in front of output data.
 pub const RUN_IDLE_LEN: usize = 4;

@@ -7,9 +7,11 @@ use proptest::prelude::*;
 use super::field::{InputField, OutputField};
 use super::handshake::{Axis, Control, Handshake, Link, Reaction, Refusal, State, Status};
 use super::layout::{Assemblies, Layout, LayoutError, SHIPPED};
-use super::{AxisInput, Scale, SizeError};
+use super::{AxisInput, DriveMode, Scale, SizeError};
+use crate::devicenet::wire::speed::SpeedControl;
 
-const SCALE: Scale = Scale { counts_per_unit: 1_000_000 };
+/// 2.4 Nm.
+const SCALE: Scale = Scale { counts_per_unit: 1_000_000, rated_torque: 2_400_000 };
 
 fn shipped(name: &str, axes: usize) -> Assemblies {
     Assemblies::new(Layout::shipped(name).unwrap(), axes).unwrap()
@@ -33,7 +35,7 @@ fn shipped_layouts_have_their_offsets() {
                 writeln!(text, "  {:3} {:5} {}", field.offset, field.kind, field.name).unwrap();
             }
             assert_eq!(offset, len);
-            assert_eq!(len % 4, 0, "the next axis is aligned");
+            assert!(len % 4 == 0 || name.starts_with("speed-torque"), "the next axis is aligned");
         }
         assert_eq!(usize::from(assemblies.o_to_t_size()), assemblies.output_len() + 6);
         assert_eq!(usize::from(assemblies.t_to_o_size()), assemblies.input_len() + 2);
@@ -196,6 +198,140 @@ fn assemblies_of_the_speed_profile_have_its_bits() {
     assert_eq!(put("speed", Status::READY, i64::MAX), [0x10, 3, 0xFF, 0x7F]);
 }
 
+#[test]
+fn assemblies_with_torque_have_it_in_scaled_newton_metres() {
+    use DriveMode::{Speed, Torque as ByTorque};
+    let of = |name, mode, scale| {
+        Assemblies::new(Layout::shipped(name).unwrap().with_torque(mode, scale), 1).unwrap()
+    };
+    let output = |name, mode, scale, data: [u8; 6]| {
+        let values = of(name, mode, scale).output_of(0, &data, SCALE).unwrap();
+        (values.control, values.mode, values.velocity, values.torque, values.refusal)
+    };
+    let (none, enable, both) = (Control::empty(), Control::ENABLE, Some(Refusal::BOTH_DIRECTIONS));
+    let rev = |nano| Some(Velocity(nano));
+    let parts = |parts| Some(Torque(parts));
+    // Rated are 2.4 Nm: 1.2 Nm are half of it. In speed control the torque reference is not even looked at.
+    for (name, mode, scale, data, expected) in [
+        ("speed-torque", Speed, 0, [0x61, 0, 60, 0, 0xFF, 0x7F], (enable, 2, rev(1_000_000_000), None, None)),
+        ("speed-torque", Speed, 4, [0x62, 0, 60, 0, 1, 0], (enable, 2, rev(-1_000_000_000), None, None)),
+        ("speed-torque", ByTorque, 0, [0x61, 0, 60, 0, 6, 0], (enable, 5, None, parts(2_500_000), None)),
+        ("speed-torque", ByTorque, 0, [0x62, 0, 60, 0, 6, 0], (enable, 5, None, parts(-2_500_000), None)),
+        (
+            "speed-torque",
+            ByTorque,
+            0,
+            [0x61, 0, 0, 0, 0xFA, 0xFF],
+            (enable, 5, None, parts(-2_500_000), None),
+        ),
+        // 16ths and 1024ths of a newton metre, and units of 4 Nm.
+        ("speed-torque", ByTorque, 4, [0x61, 0, 0, 0, 24, 0], (enable, 5, None, parts(625_000), None)),
+        ("speed-torque", ByTorque, 10, [0x61, 0, 0, 0, 1, 0], (enable, 5, None, parts(407), None)),
+        ("speed-torque", ByTorque, -2, [0x61, 0, 0, 0, 3, 0], (enable, 5, None, parts(5_000_000), None)),
+        ("speed-torque", ByTorque, 0, [0x63, 0, 0, 0, 6, 0], (none, 5, None, parts(-2_500_000), both)),
+        ("speed-torque", ByTorque, 0, [0x21, 0, 0, 0, 6, 0], (none, 5, None, parts(2_500_000), None)),
+        ("speed-torque-basic", ByTorque, 0, [0x01, 0, 0, 0, 6, 0], (enable, 5, None, parts(2_500_000), None)),
+        ("speed-torque-basic", ByTorque, 0, [0x03, 0, 0, 0, 6, 0], (enable, 5, None, parts(2_500_000), None)),
+        (
+            "speed-torque-basic",
+            ByTorque,
+            0,
+            [0x04, 0, 0, 0, 6, 0],
+            (Control::RESET, 5, None, parts(2_500_000), None),
+        ),
+    ] {
+        assert_eq!(output(name, mode, scale, data), expected, "{name} {mode:?} {scale} {data:?}");
+    }
+    // Without a rated torque no number of newton metres is any torque.
+    let unknown = Scale { rated_torque: 0, ..SCALE };
+    let values = of("speed-torque", ByTorque, 0).output_of(0, &[0x61, 0, 0, 0, 6, 0], unknown).unwrap();
+    assert_eq!((values.torque, values.refusal), (Some(Torque::ZERO), Some(Refusal::VALUE)));
+
+    let input = |name, scale, torque| {
+        let mut data = [0xFF; 6];
+        let status = Status::RUN | Status::ENABLED | Status::TORQUE;
+        let actual = AxisInput {
+            status,
+            velocity: Velocity(1_000_000_000),
+            torque: Torque(torque),
+            at_reference: true,
+            ..AxisInput::default()
+        };
+        of(name, ByTorque, scale).put_input(0, &actual, SCALE, &mut data).unwrap();
+        data
+    };
+    assert_eq!(input("speed-torque", 4, 625_000), [0xF4, 4, 60, 0, 24, 0]);
+    assert_eq!(input("speed-torque", 4, -625_000), [0xF4, 4, 60, 0, 0xE8, 0xFF]);
+    assert_eq!(input("speed-torque", 10, 407), [0xF4, 4, 60, 0, 1, 0]);
+    assert_eq!(input("speed-torque", -2, 5_000_000), [0xF4, 4, 60, 0, 3, 0]);
+    assert_eq!(input("speed-torque", 0, 200_000), [0xF4, 4, 60, 0, 0, 0], "0.48 Nm");
+    assert_eq!(input("speed-torque", 15, i64::MAX), [0xF4, 4, 60, 0, 0xFF, 0x7F]);
+    assert_eq!(input("speed-torque", 15, i64::MIN), [0xF4, 4, 60, 0, 0, 0x80]);
+    assert_eq!(input("speed-torque-basic", 4, 625_000), [0x04, 0, 60, 0, 24, 0]);
+}
+
+/// Every reaction to byte 0 of the assemblies with torque: state of the handshake by byte, the torque being 1.2 Nm.
+#[test]
+fn every_byte_of_the_drive_profile_in_every_state_has_its_reaction() {
+    let mut text = String::new();
+    for (name, mode) in [
+        ("speed-torque-basic", DriveMode::Speed),
+        ("speed-torque-basic", DriveMode::Torque),
+        ("speed-torque", DriveMode::Speed),
+        ("speed-torque", DriveMode::Torque),
+    ] {
+        let layout = Layout::shipped(name).unwrap().with_torque(mode, 1);
+        let extended = name == "speed-torque";
+        let assemblies = Assemblies::new(layout, 1).unwrap();
+        let values = |bits: u8| assemblies.output_of(0, &[bits, 0, 60, 0, 2, 0], SCALE).unwrap();
+        let from_network = if extended { 0x60 } else { 0 };
+        // Beside the profile's bits some that the assembly does not have; without run two bytes are enough.
+        let of_profile =
+            |bits: &u8| SpeedControl::from_bits(*bits).is_some_and(|_| extended || bits & !5 == 0);
+        let in_run: Vec<u8> = (0..=u8::MAX).filter(of_profile).chain([0x99 | from_network]).collect();
+        let out_of_run = vec![0, 1 | from_network];
+        for link in [Link::Run, Link::Idle, Link::Lost] {
+            for state in [State::Locked, State::Armed, State::Enabled] {
+                writeln!(text, "{name} in {} control, {link:?}, {state:?}", mode.name()).unwrap();
+                let axis = Axis { faulted: false, operating: state == State::Enabled };
+                for &bits in if link == Link::Run { &in_run } else { &out_of_run } {
+                    let mut handshake = Handshake::default();
+                    let before: &[u8] = match state {
+                        State::Locked => &[],
+                        State::Armed => &[0],
+                        State::Enabled => &[0, 1],
+                    };
+                    for one in before {
+                        handshake.step(Link::Run, values(one | from_network).control, axis);
+                    }
+                    assert_eq!(handshake.state(), state);
+                    let values = values(bits);
+                    let (reaction, refusal) = handshake.step(link, values.control, axis);
+                    let names: Vec<_> = reaction.iter_names().map(|(name, _)| name).collect();
+                    let follows = match (handshake.state(), values.velocity, values.torque) {
+                        (State::Enabled, Some(velocity), None) => {
+                            format!(", {} rpm", velocity.get() * 60 / 1_000_000_000)
+                        }
+                        (State::Enabled, None, Some(torque)) => format!(", {} ppm of torque", torque.get()),
+                        (State::Enabled, ..) => panic!("one of them moves it"),
+                        _ => String::new(),
+                    };
+                    let refusal = values.refusal.unwrap_or(refusal);
+                    writeln!(
+                        text,
+                        "  {bits:#04X} -> {:?}{}{follows}{}",
+                        handshake.state(),
+                        if names.is_empty() { String::new() } else { format!(" {}", names.join(" ")) },
+                        if refusal == Refusal::NONE { String::new() } else { format!(" ({refusal})") },
+                    )
+                    .unwrap();
+                }
+            }
+        }
+    }
+    insta::assert_snapshot!("profile_byte_by_state", text);
+}
+
 /// Every reaction to a control word: state of the handshake by word, with all bits 0 before.
 #[test]
 fn every_word_in_every_state_has_its_reaction() {
@@ -318,9 +454,22 @@ proptest! {
         }
     }
 
+    /// A torque in newton metres comes back, whatever the scale and the motor.
+    #[test]
+    fn scaled_newton_metres_come_back(units: i16, scale in -15_i8..=15, rated in 1_000_i64..1_000_000_000) {
+        let of = Scale { counts_per_unit: 1, rated_torque: rated };
+        let torque = of.torque(units, scale).unwrap();
+        // A millionth of the rated torque is less than half a unit.
+        let fine = 2.0 * f64::from(i32::try_from(rated).unwrap()) / 1e12 < f64::from(scale).exp2().recip();
+        if fine {
+            prop_assert_eq!(of.torque_units(torque, scale), units);
+        }
+        prop_assert_eq!(torque.get().signum() * i64::from(units.signum()) >= 0, true);
+    }
+
     #[test]
     fn counts_and_nanounits_are_nearest(counts in any::<i32>(), resolution in 1_u32..2_000_000_000) {
-        let scale = Scale { counts_per_unit: resolution };
+        let scale = Scale { counts_per_unit: resolution, rated_torque: 0 };
         let nano = scale.nano(i64::from(counts)).unwrap();
         let exact = i128::from(counts) * 1_000_000_000;
         prop_assert!((i128::from(nano) * i128::from(resolution) - exact).abs() * 2 <= i128::from(resolution));
@@ -342,7 +491,7 @@ proptest! {
         let layout = Layout::of_fields(fields, vec![InputField::Status]).unwrap();
         let assemblies = Assemblies::new(layout, axes).unwrap();
         let data = &seed[..assemblies.output_len()];
-        let scale = Scale { counts_per_unit: 1_000_000_000 };
+        let scale = Scale { counts_per_unit: 1_000_000_000, rated_torque: 0 };
         for axis in 0..axes {
             let values = assemblies.output_of(axis, data, scale).unwrap();
             let raw = |name: &str| {

@@ -53,6 +53,8 @@ pub struct Plc {
     pub sent: u32,
     /// Connections asked for.
     pub serial: u16,
+    /// The next connection asks for the input as multicast.
+    pub multicast: bool,
     /// Run, or idle.
     pub run: bool,
     /// The output assembly.
@@ -97,6 +99,7 @@ impl Plc {
             open: None,
             sent: 0,
             serial: 0,
+            multicast: false,
             run: true,
             output: vec![0; assemblies.output_len()],
             inputs,
@@ -140,7 +143,14 @@ impl Plc {
             o_to_t_rpi_us: us,
             o_to_t: direction(sizes.0),
             t_to_o_rpi_us: us,
-            t_to_o: direction(sizes.1),
+            t_to_o: NetworkParameters {
+                connection_type: if self.multicast {
+                    ConnectionType::MULTICAST
+                } else {
+                    ConnectionType::POINT_TO_POINT
+                },
+                ..direction(sizes.1)
+            },
             transport: Transport { server: false, trigger: Trigger::CYCLIC, class: 1 },
             path: &path,
         };

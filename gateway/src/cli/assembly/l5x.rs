@@ -17,7 +17,7 @@ const DIALECT: Dialect = Dialect {
 /// The tool would lay the fields out with gaps.
 pub fn file(library: &Library<'_>) -> Result<String, CliError> {
     for (side, fields) in [("output", library.output()), ("input", library.input())] {
-        check_alignment(side, fields)?;
+        check_alignment(side, fields, library.axes.len())?;
     }
     let block = library.block();
     let types = library.types();
@@ -46,8 +46,9 @@ pub fn file(library: &Library<'_>) -> Result<String, CliError> {
     Ok(text)
 }
 
-/// The tool aligns each member to its size, and a structure to its largest member, at least to four bytes.
-fn check_alignment(side: &str, fields: &[Field<'_>]) -> Result<(), CliError> {
+/// The tool aligns each member to its size, and a structure to its largest member, at least to four bytes. What it adds to the last
+/// axis is beyond the data.
+fn check_alignment(side: &str, fields: &[Field<'_>], axes: usize) -> Result<(), CliError> {
     if let Some(field) = fields.iter().find(|field| field.offset % field.bytes != 0) {
         return Err(format!(
             "the {side} field `{}` of {} bytes is at offset {}: in L5X a field has to be at a multiple of its size; add a `pad` field before it",
@@ -58,6 +59,7 @@ fn check_alignment(side: &str, fields: &[Field<'_>]) -> Result<(), CliError> {
     let len: usize = fields.iter().map(|field| field.bytes).sum();
     let unit = fields.iter().map(|field| field.bytes).max().unwrap_or(1).max(4);
     match len % unit {
+        _ if axes == 1 => Ok(()),
         0 => Ok(()),
         rest => Err(format!(
             "the {side} fields of an axis have {len} bytes: in L5X they have to be a multiple of {unit}; add {} bytes of `pad` fields at the end",
@@ -70,7 +72,7 @@ fn check_alignment(side: &str, fields: &[Field<'_>]) -> Result<(), CliError> {
 /// The type of the tool for a type of IEC 61131-3.
 fn kind(of: &str) -> &str {
     match of {
-        "USINT" => "SINT",
+        "USINT" | "BYTE" => "SINT",
         "UINT" => "INT",
         "UDINT" => "DINT",
         other => other,

@@ -104,13 +104,15 @@ impl<'a> Library<'a> {
     /// What the device is connected by, a line each.
     pub fn about(&self) -> Vec<String> {
         let Device { name, address, configuration_point, output, input, .. } = self.device;
-        vec![
+        let mut about = vec![
             format!("Device {name} at {address}, by `axisbridge assembly` {}.", env!("CARGO_PKG_VERSION")),
             format!("Output assembly {}: {} bytes.", output.point, output.bytes),
             format!("Input assembly {}: {} bytes.", input.point, input.bytes),
             format!("Configuration assembly {configuration_point}: 0 bytes."),
             "Run/idle header: in the output, not in the input.".to_owned(),
-        ]
+        ];
+        about.extend(self.device.torque().map(|torque| format!("References: {torque}.")));
+        about
     }
 
     /// The function block of an axis; `None` for a layout without targets or without what the block looks at.

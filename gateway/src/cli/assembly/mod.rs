@@ -27,6 +27,12 @@ struct Device<'a> {
     /// It can move to targets.
     #[serde(skip)]
     positions: bool,
+    /// What moves the axis, where the assemblies have a speed and a torque.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    drive_mode: Option<&'static str>,
+    /// TorqueScale, where they have a torque in Nm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torque_scale: Option<i8>,
     /// Connection point of the configuration assembly, which has no data.
     configuration_point: u16,
     output: Assembly<'a>,
@@ -111,11 +117,19 @@ fn devices(config: &Config) -> Vec<Device<'_>> {
         let mut axes: Vec<_> = config.axes_of(number).map(|(_, axis)| axis).collect();
         axes.sort_by_key(|axis| axis.instance);
         let names: Vec<_> = axes.iter().map(|axis| axis.name.as_str()).collect();
+        let (drive_mode, torque_scale) = match assemblies.layout() {
+            Layout::Speed { output, mode, torque_scale } if output.has_torque() => {
+                (Some(mode.name()), Some(*torque_scale))
+            }
+            _ => (None, None),
+        };
         found.push(Device {
             name: &device.name,
             address: device.listen.to_string(),
             axes: names.clone(),
             positions: matches!(assemblies.layout(), Layout::Fields { mode: None | Some(1), .. }),
+            drive_mode,
+            torque_scale,
             configuration_point: CONFIGURATION_POINT,
             output: output(assemblies, &names),
             input: input(assemblies, &names),
@@ -124,6 +138,17 @@ fn devices(config: &Config) -> Vec<Device<'_>> {
         });
     }
     found
+}
+
+impl Device<'_> {
+    /// Drive mode and scale in words, where the assemblies have a torque in Nm.
+    fn torque(&self) -> Option<String> {
+        let (mode, scale) = (self.drive_mode?, self.torque_scale?);
+        let other = if mode == "speed" { "torque" } else { "speed" };
+        Some(format!(
+            "the {mode} reference moves the axis, the {other} reference has no effect; torque in Nm / 2^{scale}"
+        ))
+    }
 }
 
 fn output<'a>(assemblies: &Assemblies, names: &[&'a str]) -> Assembly<'a> {
@@ -164,6 +189,9 @@ fn text(devices: &[Device<'_>]) -> String {
         let _ = writeln!(text, "  configuration point {configuration_point}, 0 bytes");
         let heartbeats = format!("input only {input_only_point}, listen only {listen_only_point}");
         let _ = writeln!(text, "  heartbeat points: {heartbeats}");
+        if let Some(torque) = device.torque() {
+            let _ = writeln!(text, "  {torque}");
+        }
         for (side, assembly) in [("output", &device.output), ("input", &device.input)] {
             let Assembly { point, bytes, connection_size, .. } = assembly;
             let sizes = format!("{bytes} bytes, {connection_size} in a Forward_Open");
@@ -186,6 +214,9 @@ fn markdown(devices: &[Device<'_>]) -> String {
         let _ = writeln!(text, "| configuration point | {}, 0 bytes |", device.configuration_point);
         let _ = writeln!(text, "| heartbeat, input only | {} |", device.input_only_point);
         let _ = writeln!(text, "| heartbeat, listen only | {} |", device.listen_only_point);
+        if let Some(torque) = device.torque() {
+            let _ = writeln!(text, "| references | {torque} |");
+        }
         for (side, assembly) in [("Output", &device.output), ("Input", &device.input)] {
             let Assembly { point, bytes, connection_size, .. } = assembly;
             let _ = writeln!(

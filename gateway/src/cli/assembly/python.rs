@@ -100,7 +100,7 @@ fn words(text: &mut String) {
 /// The letter of the module `struct` for a type.
 fn code(kind: &str) -> char {
     match kind {
-        "USINT" => 'B',
+        "USINT" | "BYTE" => 'B',
         "INT" => 'h',
         "UINT" => 'H',
         "DINT" => 'i',

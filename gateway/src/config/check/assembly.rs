@@ -1,7 +1,8 @@
 //! `[device.assembly]`.
 
-use profile_cip::assembly::layout::SHIPPED;
-use profile_cip::assembly::{Assemblies, InputField, Layout, LayoutError, OutputField};
+use profile_cip::assembly::layout::{SHIPPED, TORQUE_SCALE_MAX};
+use profile_cip::assembly::{Assemblies, DriveMode, InputField, Layout, LayoutError, OutputField};
+use profile_generic::parameter::Parameter;
 
 use super::{Problems, value};
 use crate::config::file::{AssemblyTable, DeviceTable};
@@ -10,12 +11,17 @@ use crate::finding::Spanned;
 use crate::finding::registry as code;
 
 /// Names of the shipped layouts.
-pub(in crate::config) const LAYOUTS: [(&str, &str); 5] = {
-    let [a, b, c, d, e] = SHIPPED;
-    [(a, a), (b, b), (c, c), (d, d), (e, e)]
+pub(in crate::config) const LAYOUTS: [(&str, &str); 7] = {
+    let [a, b, c, d, e, f, g] = SHIPPED;
+    [(a, a), (b, b), (c, c), (d, d), (e, e), (f, f), (g, g)]
 };
 
 const DEFAULT_LAYOUT: &str = "position";
+
+/// Names of the modes of assemblies with speed and torque.
+pub(in crate::config) fn drive_modes() -> Vec<(&'static str, DriveMode)> {
+    DriveMode::NAMED.to_vec()
+}
 
 /// Fields of the output assembly.
 pub(in crate::config) fn output_fields() -> Vec<(&'static str, OutputField)> {
@@ -46,6 +52,7 @@ pub(super) fn check(problems: &mut Problems, device: &DeviceTable) -> Option<Opt
         );
     }
     let layout = layout(problems, table)?;
+    let layout = torque(problems, table, layout)?;
     match Assemblies::new(layout, device.axes.get_ref().len()) {
         Ok(assemblies) => sound.then_some(Some(assemblies)),
         Err(error) => {
@@ -59,7 +66,7 @@ pub(super) fn check(problems: &mut Problems, device: &DeviceTable) -> Option<Opt
 }
 
 fn layout(problems: &mut Problems, table: &Spanned<AssemblyTable>) -> Option<Layout> {
-    let AssemblyTable { layout, output, input } = table.get_ref();
+    let AssemblyTable { layout, output, input, .. } = table.get_ref();
     match (layout, output, input) {
         (Some(name), None, None) => Layout::shipped(value::word(problems, name, "layout", &LAYOUTS)?),
         (None, None, None) => Layout::shipped(DEFAULT_LAYOUT),
@@ -89,6 +96,40 @@ fn layout(problems: &mut Problems, table: &Spanned<AssemblyTable>) -> Option<Lay
             "expected both `output` and `input`",
         ),
     }
+}
+
+/// Mode and scale of a layout with speed and torque: which of them moves a machine is to be said. No other layout has them.
+fn torque(problems: &mut Problems, table: &Spanned<AssemblyTable>, layout: Layout) -> Option<Layout> {
+    let AssemblyTable { layout: name, drive_mode, torque_scale, .. } = table.get_ref();
+    if !layout.has_torque_in_nm() {
+        let keys = [
+            drive_mode.as_ref().map(|key| ("drive_mode", key.span())),
+            torque_scale.as_ref().map(|key| ("torque_scale", key.span())),
+        ];
+        let mut sound = true;
+        for (key, span) in keys.into_iter().flatten() {
+            sound = false;
+            problems.report_as::<()>(
+                code::CONTRADICTION,
+                span,
+                format_args!("`{key}` of a layout without speed and torque"),
+                "expected it with the layouts \"speed-torque\" and \"speed-torque-basic\" only",
+            );
+        }
+        return sound.then_some(layout);
+    }
+    let range = -i64::from(TORQUE_SCALE_MAX)..=i64::from(TORQUE_SCALE_MAX);
+    let scale = value::number_or(problems, torque_scale, "TorqueScale", range, 0_i8);
+    let Some(mode) = drive_mode else {
+        return problems.report_as(
+            code::CONTRADICTION,
+            name.as_ref().map_or(table.span(), Spanned::span),
+            "the layout has a speed and a torque, and nothing says which of them moves the axis",
+            "expected `drive_mode = \"speed\"` or `drive_mode = \"torque\"`",
+        );
+    };
+    let mode = value::word(problems, mode, "drive mode", &drive_modes())?;
+    Some(layout.with_torque(mode, scale?))
 }
 
 fn fields<T: Copy>(
@@ -135,13 +176,52 @@ pub(super) fn axes(
                 "expected `acceleration` in the limits of the axis, or a layout with it",
             );
         }
+        let Layout::Speed { mode, .. } = assemblies.layout() else { continue };
+        if assemblies.layout().has_torque_in_nm() {
+            in_newton_metres(problems, written, *mode, own());
+        }
         let linear = |axis: &&Axis| axis.kind == AxisKind::Linear;
-        for axis in own().filter(linear).filter(|_| matches!(assemblies.layout(), Layout::Speed { .. })) {
+        for axis in own().filter(linear) {
             problems.report_as::<()>(
                 code::CONTRADICTION,
                 written.span(),
                 format_args!("the speed of the axis `{}` is not in revolutions", axis.name),
                 "expected an axis in revolutions, or another layout",
+            );
+        }
+    }
+}
+
+/// What a torque in Nm needs of the axes.
+fn in_newton_metres<'a>(
+    problems: &mut Problems,
+    written: &Spanned<AssemblyTable>,
+    mode: DriveMode,
+    axes: impl Iterator<Item = &'a Axis>,
+) {
+    let AssemblyTable { layout, drive_mode, .. } = written.get_ref();
+    let at = |key: &Option<Spanned<String>>| key.as_ref().map_or(written.span(), Spanned::span);
+    for axis in axes.filter(|axis| axis.kind == AxisKind::Rotary) {
+        if axis.nameplate.value(Parameter::MOTOR_RATED_TORQUE).is_none() {
+            problems.report_as::<()>(
+                code::CONTRADICTION,
+                at(layout),
+                format_args!(
+                    "the torque of the layout is in Nm, and the axis `{}` has no rated torque",
+                    axis.name
+                ),
+                "expected `rated_torque` in the `motor` of the axis: drives count torque in parts of it",
+            );
+        }
+        if mode == DriveMode::Torque && axis.limits.velocity.is_none() {
+            problems.report_as::<()>(
+                code::CONTRADICTION,
+                at(drive_mode),
+                format_args!(
+                    "the axis `{}` has no velocity limit, and a torque alone does not limit it",
+                    axis.name
+                ),
+                "expected `velocity` in the limits of the axis",
             );
         }
     }
@@ -181,6 +261,17 @@ mod tests {
             ("{ layout = \"mixed\", input = [\"status\"] }", "a shipped layout and fields of its own"),
             ("{ output = [\"control\", \"mode\"] }", "the fields of one direction only"),
             ("{ output = [\"control\"], input = [\"status\"] }", "the output has no field `mode`"),
+            (
+                "{ layout = \"speed\", drive_mode = \"speed\" }",
+                "`drive_mode` of a layout without speed and torque",
+            ),
+            ("{ torque_scale = 1 }", "`torque_scale` of a layout without speed and torque"),
+            (
+                "{ layout = \"speed-torque\", torque_scale = 1 }",
+                "the layout has a speed and a torque, and nothing says which of them moves the axis",
+            ),
+            ("{ layout = \"speed-torque\", drive_mode = \"position\" }", "unknown drive mode `position`"),
+            ("{ layout = \"speed-torque\", drive_mode = \"speed\", torque_scale = 16 }", "TorqueScale is 16"),
             ("{ output = [\"control\", \"modes\"], input = [\"status\"] }", "unknown output field `modes`"),
         ] {
             assert_eq!(device(&format!("assembly = {keys}")), Err(vec![title.to_owned()]), "{keys}");

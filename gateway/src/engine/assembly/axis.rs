@@ -19,7 +19,7 @@ use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet, StatusBits};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
-use profile_generic::quantity::{Acceleration, Position, Velocity};
+use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::state::{DriveState, Request};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeBase;
@@ -41,6 +41,9 @@ mod mode {
     pub const CYCLIC_VELOCITY: u8 = 4;
     pub const CYCLIC_TORQUE: u8 = 5;
 }
+
+/// Torque within which the reference of torque control counts as reached: 2 % of the rated one.
+const AT_TORQUE: u64 = 20_000;
 
 /// What is around an axis in a cycle.
 #[derive(Clone, Copy)]
@@ -86,6 +89,8 @@ pub(super) struct PlcAxis {
     done: bool,
     /// The last set-point of the controller that was handed on.
     last: Option<SetPoint>,
+    /// The same of a torque.
+    torque: Option<Torque>,
     start_taken: bool,
     refusal: Refusal,
     sequence: u32,
@@ -115,6 +120,7 @@ impl PlcAxis {
             target: None,
             done: false,
             last: None,
+            torque: None,
             start_taken: false,
             refusal: Refusal::NONE,
             sequence: 0,
@@ -142,7 +148,7 @@ impl PlcAxis {
         axis.retry_wish(now, system);
         self.standstill.watch(now, axis);
         if !axis.operates() {
-            (self.source, self.followed, self.last) = (Source::None, None, None);
+            (self.source, self.followed, self.last, self.torque) = (Source::None, None, None, None);
         }
         let known = Axis { faulted: is_faulted(axis), operating: axis.operates() };
         let before = self.handshake.state();
@@ -263,7 +269,7 @@ impl PlcAxis {
                 return self.brake(around, axis);
             }
             (self.mode, self.source, self.followed) = (output.mode, Source::None, None);
-            self.last = None;
+            (self.last, self.torque) = (None, None);
             // Nobody has set-points until there is another source: the axis holds its position.
             axis.end_set_points();
         }
@@ -379,6 +385,7 @@ impl PlcAxis {
             None => Target::Paced(paced_at),
         };
         self.last = Some(self.handed(axis.instant_of(target), &command));
+        self.torque = (selection.mode == OperatingMode::Torque).then_some(command.torque);
         let unusable = u32::from(output.refusal.is_some());
         let sequence = self.sequence;
         let points = NorthPoints { command, sequence, target, saturated: 0, unusable, is_counted: false };
@@ -509,6 +516,9 @@ impl PlcAxis {
             if known && around.synchronized { around.time.system_at(feedback.at) } else { SystemTime(0) };
         let at_reference = match (&self.source, self.followed) {
             (Source::Generator(generator), Some((velocity, _))) => generator.profile.velocity() == velocity,
+            (Source::Cyclic, _) => {
+                self.torque.is_some_and(|torque| feedback.torque.get().abs_diff(torque.get()) <= AT_TORQUE)
+            }
             _ => false,
         };
         AxisInput {

@@ -20,6 +20,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use profile_cip::assembly::layout::ASSEMBLY_LEN_MAX;
 use profile_cip::assembly::{Assemblies, Link, Scale};
 use profile_cip::device::motion_link::{ExplicitReply, ExplicitRequest, MotionReply, MotionRequest, Token};
+use profile_cip::device::objects::ac_dc_drive::{self, VALUE_LEN};
 use profile_cip::device::objects::assembly::is_data;
 use profile_cip::device::visualization::{self, Indication, NetworkCondition};
 use profile_cip::wire::status::GeneralStatus;
@@ -159,7 +160,9 @@ impl AssemblyChannel {
                     self.connections.close(close.o_to_t_id);
                     MotionReply::Closed { token: close.token }
                 }
-                MotionRequest::Explicit(explicit) if is_data(&explicit.path) => {
+                MotionRequest::Explicit(explicit)
+                    if is_data(&explicit.path) || ac_dc_drive::place(&explicit.path).is_some() =>
+                {
                     MotionReply::Explicit(self.data_of(&explicit))
                 }
                 MotionRequest::Explicit(explicit) => match self.parameters.push(explicit) {
@@ -189,14 +192,18 @@ impl AssemblyChannel {
     }
 
     /// The data of an assembly for an explicit request: of the input what is sent next, of the output what counts, which is nothing
-    /// while no owner is in run.
+    /// while no owner is in run. A value of the AC/DC Drive object is a part of them.
     fn data_of(&self, request: &ExplicitRequest) -> ExplicitReply {
         let is = |point: u16| request.path.instance == u32::from(point);
         let mut reply = ExplicitReply::status(request.token, GeneralStatus::SUCCESS.0);
-        let data: &[u8] = if is(self.assemblies.input_point()) {
+        let output = || self.connections.output().unwrap_or(&ZEROS[..self.assemblies.output_len()]);
+        let data: &[u8] = if let Some(place) = ac_dc_drive::place(&request.path) {
+            let all: &[u8] = if place.output { output() } else { &self.input };
+            all.get(place.offset..place.offset + VALUE_LEN).unwrap_or_default()
+        } else if is(self.assemblies.input_point()) {
             &self.input
         } else if is(self.assemblies.output_point()) {
-            self.connections.output().unwrap_or(&ZEROS[..self.assemblies.output_len()])
+            output()
         } else {
             &[]
         };

@@ -326,7 +326,10 @@ fn assembly_axis(number: usize, axis: &Axis) -> AssemblyAxis {
     AssemblyAxis {
         axis: number,
         instance: u16::from(axis.instance),
-        scale: Scale { counts_per_unit: axis.motion_resolution },
+        scale: Scale {
+            counts_per_unit: axis.motion_resolution,
+            rated_torque: axis.nameplate.value(Parameter::MOTOR_RATED_TORQUE).unwrap_or(0),
+        },
         stops: StopSettings {
             plan: StopPlan { method, hold: false },
             times: SequenceTimes { zero_speed, ..SequenceTimes::default() },

@@ -1,10 +1,11 @@
 //! The assemblies by the names of their fields.
 
 use profile_cip::assembly::handshake::Status;
-use profile_cip::assembly::{Assemblies, Control, Layout, Placed, Refusal};
+use profile_cip::assembly::{Assemblies, Control, DriveMode, Layout, Placed, Refusal};
 use profile_generic::fault::FaultCause;
 
 use super::PlcError;
+use super::profile::Profile;
 
 /// The output assembly as it is sent, and the input assembly that came last.
 #[derive(Debug, Clone)]
@@ -17,22 +18,29 @@ pub struct Images {
     inputs: Vec<Placed>,
     /// The mode of a layout without a field for it.
     mode: Option<u8>,
+    /// The assemblies are those of the AC/DC drive profile.
+    profile: Option<Profile>,
 }
 
 impl Images {
-    /// Zeros.
-    ///
-    /// # Errors
-    /// The assemblies have no control and status word.
-    pub fn new(assemblies: &Assemblies) -> Result<Self, PlcError> {
-        let Layout::Fields { mode, .. } = assemblies.layout() else { return Err(PlcError::Speed) };
-        Ok(Self {
+    /// Zeros; `counts` are those in a unit of each axis.
+    #[must_use]
+    pub fn new(assemblies: &Assemblies, counts: &[u32]) -> Self {
+        let (mode, profile) = match assemblies.layout() {
+            Layout::Fields { mode, .. } => (*mode, None),
+            Layout::Speed { output, mode, .. } => {
+                let mode = if *mode == DriveMode::Speed { 2 } else { 5 };
+                (Some(mode), Some(Profile::new(*output, counts.first().copied().unwrap_or(1))))
+            }
+        };
+        Self {
             output: vec![0; assemblies.output_len()],
             input: vec![0; assemblies.input_len()],
             outputs: assemblies.output(),
             inputs: assemblies.input(),
-            mode: *mode,
-        })
+            mode,
+            profile,
+        }
     }
 
     /// A field of the output.
@@ -41,7 +49,9 @@ impl Images {
         self.outputs.iter().find(|field| field.axis == axis && field.name == name).copied()
     }
 
-    fn find_input(&self, axis: usize, name: &str) -> Option<Placed> {
+    /// A field of the input.
+    #[must_use]
+    pub fn find_input(&self, axis: usize, name: &str) -> Option<Placed> {
         self.inputs.iter().find(|field| field.axis == axis && field.name == name).copied()
     }
 
@@ -64,9 +74,24 @@ impl Images {
     /// Writes the control word.
     ///
     /// # Errors
-    /// The layout has none.
+    /// The layout has none, or not these bits.
     pub fn set_word(&mut self, axis: usize, word: Control) -> Result<(), PlcError> {
-        self.set(axis, "control", i64::from(word.bits()))
+        let bits = match self.profile {
+            Some(profile) => i64::from(profile.control(word).ok_or(PlcError::Profile)?),
+            None => i64::from(word.bits()),
+        };
+        self.set(axis, "control", bits)
+    }
+
+    /// Writes the velocity, counts/s; a speed reference is the nearest one.
+    ///
+    /// # Errors
+    /// As [`Self::set`].
+    pub fn set_velocity(&mut self, axis: usize, velocity: i64) -> Result<(), PlcError> {
+        match self.profile {
+            Some(profile) => self.set(axis, "speed_reference", profile.rpm(velocity)),
+            None => self.set(axis, "velocity", velocity),
+        }
     }
 
     /// Writes the target, in the width that the layout has.
@@ -119,6 +144,9 @@ impl Images {
     /// The status word.
     #[must_use]
     pub fn status(&self, axis: usize) -> Status {
+        if let Some(profile) = self.profile {
+            return profile.status(&self.input);
+        }
         Status::from_bits_retain(
             self.get(axis, "status").and_then(|word| u16::try_from(word).ok()).unwrap_or(0),
         )
@@ -145,7 +173,10 @@ impl Images {
     /// The actual velocity, counts/s.
     #[must_use]
     pub fn velocity(&self, axis: usize) -> Option<i64> {
-        self.get(axis, "actual_velocity")
+        match self.profile {
+            Some(profile) => self.get(axis, "actual_speed").map(|rpm| profile.velocity(rpm)),
+            None => self.get(axis, "actual_velocity"),
+        }
     }
 }
 

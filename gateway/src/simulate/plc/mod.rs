@@ -16,6 +16,7 @@
 mod image;
 mod line;
 mod player;
+mod profile;
 pub mod script;
 mod session;
 mod step;
@@ -94,9 +95,9 @@ pub enum PlcError {
         /// The one of the layout.
         found: u8,
     },
-    /// The assemblies are those of the AC/DC drive profile.
-    #[error("the layout of the device is one of the AC/DC drive profile; expected one with a control word")]
-    Speed,
+    /// The assemblies of the AC/DC drive profile have no such bit.
+    #[error("the layout of the device is one of the AC/DC drive profile, which has neither STOP nor START")]
+    Profile,
     /// A value does not fit its field.
     #[error("{value} does not fit the field `{field}`")]
     Value {

@@ -89,9 +89,9 @@ pub fn run(plan: &Plan, steps: &[Planned], stop: &AtomicBool, report: &mut dyn F
         late: 0,
         failure: None,
     };
-    let begun = Images::new(&plan.assemblies).and_then(|images| Ok((images, Session::open(plan.address)?)));
-    let (images, session) = match begun {
-        Ok(begun) => begun,
+    let images = Images::new(&plan.assemblies, &plan.counts);
+    let session = match Session::open(plan.address) {
+        Ok(session) => session,
         Err(error) => {
             outcome.failure = Some(Failure { step: None, error });
             return outcome;
@@ -384,7 +384,7 @@ impl Player<'_> {
         within: Duration,
     ) -> Result<(), PlcError> {
         self.images.set_mode(axis, VELOCITY)?;
-        self.images.set(axis, "velocity", velocity)?;
+        self.images.set_velocity(axis, velocity)?;
         self.images.set_acceleration(axis, acceleration)?;
         let wait = Wait { axes: &[axis], step: "follow the velocity", within, with_faults: false };
         self.until(wait, Control::ENABLE, |images, axis| {

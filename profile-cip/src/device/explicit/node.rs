@@ -10,6 +10,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 use super::adapter::{DEVICE_TIMEOUT, SessionSlot};
 use super::reset::{self, Reset};
 use super::{forward_close, forward_open};
+use crate::assembly::{Assemblies, Layout};
 use crate::device::config::{AdapterConfig, QosConfig};
 use crate::device::connection::manager::{
     ASSEMBLY_CONNECTIONS_MAX, CONNECTIONS_MAX, ConnectionManager, Motion, Owner,
@@ -21,9 +22,10 @@ use crate::device::motion_link::{
     AssemblyOpen, CloseParameters, ConnectionTriad, ExplicitRequest, MotionReply, MotionRequest, ObjectPath,
     OpenParameters, Token,
 };
+use crate::device::objects::ac_dc_drive;
 use crate::device::objects::assembly::{self, Outcome};
 use crate::device::objects::class::{
-    CLASS_ASSEMBLY, CLASS_AXIS_PARAMETER, CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER,
+    CLASS_AC_DC_DRIVE, CLASS_ASSEMBLY, CLASS_AXIS_PARAMETER, CLASS_CONNECTION_MANAGER, CLASS_MESSAGE_ROUTER,
     CLASS_MOTION_DEVICE_AXIS,
 };
 use crate::device::objects::connection_manager::{self, Statistics};
@@ -196,10 +198,13 @@ impl Node {
         if self.is_foreign(client, path.class, request.service) {
             return self.refuse(request.service, GeneralStatus::PRIVILEGE_VIOLATION);
         }
-        if path.class == CLASS_ASSEMBLY
-            && let Some(assemblies) = &self.config.assembly
-        {
-            return match assembly::serve(assemblies, request.service, &path, request.data) {
+        let of_assemblies = self.config.assembly.as_ref().and_then(|assemblies| match path.class {
+            CLASS_ASSEMBLY => Some(assembly::serve(assemblies, request.service, &path, request.data)),
+            CLASS_AC_DC_DRIVE => ac_dc_drive::serve(assemblies, request.service, &path, request.data),
+            _ => None,
+        });
+        if let Some(outcome) = of_assemblies {
+            return match outcome {
                 Outcome::Data => self.hand_on(origin, &request, path),
                 Outcome::Done(answer) => self.answered(origin, request.service, answer),
             };
@@ -254,11 +259,14 @@ impl Node {
                 let motion = listeners + u16::from(self.connections.motion.parameters().is_some());
                 let has_axes = self.config.assembly.is_none();
                 let has_file = !self.config.eds.is_empty();
+                let layout = self.config.assembly.as_ref().map(Assemblies::layout);
+                let has_drive = matches!(layout, Some(Layout::Speed { .. }));
                 let mut router = MessageRouter {
                     available: self.connections_max(),
                     active: explicit + motion,
                     has_file,
                     has_axes,
+                    has_drive,
                 };
                 serve(&mut router, service, path, data, limit)
             }

@@ -1,5 +1,6 @@
 //! The CIP objects of the device beside the axes.
 
+pub mod ac_dc_drive;
 pub mod assembly;
 pub mod class;
 pub(super) mod connection_manager;

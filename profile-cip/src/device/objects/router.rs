@@ -1,6 +1,6 @@
 //! The Message Router object (class 0x02) and the way from a path to an object.
 
-use super::class::{CLASS_ASSEMBLY, CLASS_AXIS_PARAMETER, CLASS_MOTION_DEVICE_AXIS};
+use super::class::{CLASS_AC_DC_DRIVE, CLASS_ASSEMBLY, CLASS_AXIS_PARAMETER, CLASS_MOTION_DEVICE_AXIS};
 use super::file::CLASS_FILE;
 use super::list::OBJECT_CLASSES;
 use super::object::Object;
@@ -58,6 +58,8 @@ pub(crate) struct MessageRouter {
     pub has_file: bool,
     /// Whether there is a Motion Device Axis Object, or else assemblies and an object for the parameters of drives.
     pub has_axes: bool,
+    /// Whether its assemblies are those of the AC/DC drive profile, with their object.
+    pub has_drive: bool,
 }
 
 impl Object for MessageRouter {
@@ -73,7 +75,8 @@ impl Object for MessageRouter {
                 let classes = classes.filter(|class| *class != CLASS_MOTION_DEVICE_AXIS || self.has_axes);
                 let of_assemblies =
                     [CLASS_ASSEMBLY, CLASS_AXIS_PARAMETER].into_iter().filter(|_| !self.has_axes);
-                let mut classes: Vec<u16> = classes.chain(of_assemblies).collect();
+                let of_profile = self.has_drive.then_some(CLASS_AC_DC_DRIVE);
+                let mut classes: Vec<u16> = classes.chain(of_assemblies).chain(of_profile).collect();
                 classes.sort_unstable();
                 out.extend(u16::try_from(classes.len()).unwrap_or(0).to_le_bytes());
                 out.extend(classes.into_iter().flat_map(u16::to_le_bytes));

@@ -23,6 +23,11 @@ pub use crate::generated::devicenet::{Assembly, SupervisorState};
 use crate::generated::devicenet::{speed_control, speed_status};
 use crate::wire::{Error, Reader, Writer};
 
+/// `DriveMode` (attribute 6 of the AC/DC Drive object): closed-loop speed control.
+pub const DRIVE_MODE_SPEED: u8 = 2;
+/// `DriveMode`: torque control.
+pub const DRIVE_MODE_TORQUE: u8 = 3;
+
 impl Assembly {
     /// Whether it is one that a drive consumes.
     #[must_use]

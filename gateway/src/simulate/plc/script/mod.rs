@@ -24,7 +24,7 @@ use profile_generic::time::DurationNs;
 use toml::de::{DeTable, DeValue};
 
 use self::steps::Frame;
-use super::{Images, Plan, Planned, PlcError};
+use super::{Images, Plan, Planned};
 use crate::config::{Config, FILE_LEN_MAX};
 use crate::finding::{Findings, read_file};
 use crate::simulate::script::reader::{self, Keys, Problems};
@@ -89,13 +89,7 @@ fn read(table: &DeTable<'_>, source: &str, config: &Config, problems: &Problems)
     let list = keys.find("step");
     keys.finish()?;
     let plan = Plan::of(config, device, interval)?;
-    let images = match Images::new(&plan.assemblies) {
-        Ok(images) => images,
-        Err(error @ PlcError::Speed) => {
-            return problems.report(0..0, error, "expected a layout such as position or mixed");
-        }
-        Err(error) => return problems.report(0..0, error, "expected a layout with it"),
-    };
+    let images = Images::new(&plan.assemblies, &plan.counts);
     let mut steps = Vec::new();
     if let Some(list) = list {
         let DeValue::Array(items) = list.get_ref() else {

@@ -37,7 +37,7 @@ const VERBS: &[Verb] = &[
     ("enable", |v, f| of_axes(v, f, "enable", Step::Enable)),
     ("disable", |v, f| of_axes(v, f, "disable", Step::Disable)),
     ("fault_reset", |v, f| of_axes(v, f, "reset the faults of", Step::FaultReset)),
-    ("stop", |v, f| of_axes(v, f, "stop", Step::Stop)),
+    ("stop", stop),
     ("move", go),
     ("velocity", follow),
     ("word", word),
@@ -101,6 +101,15 @@ fn of_axes(value: &Value<'_>, frame: &Frame<'_>, verb: &str, step: fn(Vec<usize>
     let names: Vec<_> = axes.iter().map(|axis| frame.plan.name(*axis)).collect();
     let title = format!("{verb} {}", names.join(", "));
     Some((step(axes), HANDSHAKE, title))
+}
+
+/// `stop = axes`
+fn stop(value: &Value<'_>, frame: &Frame<'_>) -> Option<Made> {
+    let word = Control::ENABLE | Control::STOP;
+    carried(value, frame, |images| {
+        (0..frame.plan.names.len()).try_for_each(|axis| images.set_word(axis, word))
+    })?;
+    of_axes(value, frame, "stop", Step::Stop)
 }
 
 fn lasting(
@@ -190,7 +199,7 @@ fn follow(value: &Value<'_>, frame: &Frame<'_>) -> Option<Made> {
     keys.finish()?;
     carried(value, frame, |images| {
         images.set_mode(axis, 2)?;
-        images.set(axis, "velocity", velocity)?;
+        images.set_velocity(axis, velocity)?;
         images.set_acceleration(axis, acceleration)
     })?;
     let title = format!("run {} at {units} per second", frame.plan.name(axis));
@@ -211,6 +220,7 @@ fn word(value: &Value<'_>, frame: &Frame<'_>) -> Option<Made> {
         }
     };
     keys.finish()?;
+    carried(value, frame, |images| images.set_word(axis, word))?;
     let title = format!("control word of {}: {:#06x}", frame.plan.name(axis), word.bits());
     Some((Step::Word { axis, word }, HANDSHAKE, title))
 }
@@ -294,6 +304,7 @@ fn condition(
                 Some(code) => FaultCause(code),
                 None => word_of(wanted, name, &known, problems)?,
             };
+            shown(wanted, axis, "fault", frame)?;
             let condition = Condition::Fault(cause);
             Some((condition, condition.to_string()))
         }
@@ -303,6 +314,7 @@ fn condition(
                 Some(code) => Refusal(code),
                 None => word_of(wanted, name, &known, problems)?,
             };
+            shown(wanted, axis, "refusal", frame)?;
             let condition = Condition::Refusal(refusal);
             Some((condition, condition.to_string()))
         }
@@ -327,6 +339,17 @@ fn condition(
             }
             let shown = |value: i64| f64_from_i64(value) / f64::from(frame.plan.counts[axis]);
             Some((condition, format!("{name} {} +/- {}", shown(value), shown(tolerance))))
+        }
+    }
+}
+
+/// Whether the input has a field of which something is expected.
+fn shown(wanted: &Value<'_>, axis: usize, field: &str, frame: &Frame<'_>) -> Option<()> {
+    match frame.images.find_input(axis, field) {
+        Some(_) => Some(()),
+        None => {
+            let title = format!("the input has no field `{field}`");
+            frame.problems.report(wanted.span(), title, "expected a layout with it")
         }
     }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::simulate::plc::Step;
 
 /// A device with two axes whose layout has every field, one in the drive profile's, and one of CIP Motion.
 const CONFIGURATION: &str = include_str!("box.toml");
@@ -36,7 +37,7 @@ fn the_only_device_with_assemblies_is_meant() {
     let script = Script::parse("[[step]]\nenable = \"all\"\n", "short.toml", &config).expect("a script");
     assert_eq!(script.plan.names, ["turntable", "slide"]);
     assert_eq!(script.plan.interval, Duration::from_millis(8));
-    assert_eq!(script.steps[0].step, crate::simulate::plc::Step::Enable(vec![0, 1]));
+    assert_eq!(script.steps[0].step, Step::Enable(vec![0, 1]));
 }
 
 #[test]
@@ -48,7 +49,6 @@ fn what_is_wrong_is_reported_at_its_place() {
         "",
         "device = \"front\"",
         "device = 3",
-        "device = \"conveyor\"",
         "device = \"plc\"\ninterval = \"200 ms\"",
         "device = \"plc\"\ninterval = 5",
         "device = \"plc\"\ncolour = 1",
@@ -103,4 +103,51 @@ fn the_mode_of_the_layout_is_the_only_one() {
     let script = "device = \"plc\"\nstep = [{ move = { axis = \"slide\", to = 1, velocity = 1 } }]";
     let error = Script::parse(script, "script.toml", &config).expect_err("mode 3").to_string();
     assert!(error.contains("no mode 1, only 3"), "{error}");
+}
+
+/// Assemblies of the AC/DC drive profile run at a speed or take a torque, and have neither STOP nor targets nor reasons.
+#[test]
+fn assemblies_of_the_drive_profile_run_and_do_not_move() {
+    let torque = "layout = \"speed-torque\", drive_mode = \"torque\"";
+    let by_torque = CONFIGURATION.replacen("layout = \"speed\"", torque, 1).replacen(
+        "limits = { acceleration = 100.0 }",
+        "limits = { acceleration = 100.0, velocity = 20.0 }\nmotor = { rated_torque = 1.0 }",
+        1,
+    );
+    let parse = |text: &str, step: &str| {
+        let config = Config::parse(text, "box.toml").unwrap_or_else(|error| panic!("{error}"));
+        let script = format!("device = \"conveyor\"\nstep = [{{ {step} }}]");
+        Script::parse(&script, "script.toml", &config).map(|script| script.steps[0].step.clone())
+    };
+    let velocity = "velocity = { axis = \"spindle\", velocity = -2 }";
+    let step = parse(CONFIGURATION, velocity).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(step, Step::Velocity { axis: 0, velocity: -2_000_000, acceleration: 0, wait: true });
+    let set = "set = { axis = \"spindle\", field = \"torque_reference\", value = -3 }";
+    let step = parse(&by_torque, set).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(step, Step::Set { axis: 0, field: "torque_reference", value: -3 });
+    for (text, step, title) in [
+        (CONFIGURATION, "stop = \"spindle\"", "which has neither STOP nor START"),
+        (
+            CONFIGURATION,
+            "word = { axis = \"spindle\", bits = [\"start\"] }",
+            "which has neither STOP nor START",
+        ),
+        (CONFIGURATION, "move = { axis = \"spindle\", to = 1, velocity = 1 }", "no mode 1, only 2"),
+        (CONFIGURATION, "velocity = { axis = \"spindle\", velocity = 600 }", "36000 does not fit"),
+        (CONFIGURATION, set, "the output has no field `torque_reference`"),
+        (
+            CONFIGURATION,
+            "expect = { axis = \"spindle\", fault = \"none\" }",
+            "the input has no field `fault`",
+        ),
+        (
+            CONFIGURATION,
+            "expect = { axis = \"spindle\", refusal = \"none\" }",
+            "the input has no field `refusal`",
+        ),
+        (&by_torque, velocity, "no mode 2, only 5"),
+    ] {
+        let error = parse(text, step).expect_err(step).to_string();
+        assert!(error.contains(title), "{step}: {error}");
+    }
 }

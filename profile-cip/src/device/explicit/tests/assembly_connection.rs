@@ -3,10 +3,11 @@
 use core::net::{Ipv4Addr, SocketAddrV4};
 
 use super::rig::*;
-use crate::assembly::{Assemblies, Layout};
+use crate::assembly::{Assemblies, DriveMode, Layout};
 use crate::device::event::Event;
 use crate::device::explicit::adapter::DEVICE_TIMEOUT;
 use crate::device::motion_link::*;
+use crate::device::objects::ac_dc_drive::{self, Place};
 use crate::wire::cpf::ItemType;
 use crate::wire::forward_open::{ForwardOpen, ForwardOpenReply, Transport, Trigger};
 use crate::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
@@ -302,6 +303,80 @@ fn the_assembly_object_has_data_and_sizes_that_cannot_be_set() {
     assert_eq!(rig.ask(panel, &message(GET, &path(100, 4), &[])).data, [40, 0]);
     assert_eq!(rig.ask(panel, &message(SET, &path(150, 3), &[0; 32])).status, 0x0F);
     assert_eq!(rig.ask(client, &message(SET, &path(150, 3), &[0; 32])).status, 0x0E);
+}
+
+/// The AC/DC Drive object is there with the assemblies of its profile only; what they carry, the motion device answers.
+#[test]
+fn the_drive_object_is_there_with_the_assemblies_of_its_profile() {
+    const GET: Service = Service::GET_ATTRIBUTE_SINGLE;
+    const SET: Service = Service::SET_ATTRIBUTE_SINGLE;
+    let path = |instance: u8, attribute: u8| [0x20, 0x2A, 0x24, instance, 0x30, attribute];
+    let classes = |rig: &mut Rig, client| {
+        let data = rig.ask(client, &message(GET, &[0x20, 2, 0x24, 1, 0x30, 1], &[])).data;
+        data[2..].chunks(2).map(|class| u16::from_le_bytes([class[0], class[1]])).collect::<Vec<_>>()
+    };
+    let mut plain = rig();
+    let client = plain.client(1);
+    assert_eq!(plain.ask(client, &message(GET, &path(1, 6), &[])).status, 5);
+    assert!(!classes(&mut plain, client).contains(&0x2A));
+    let of = |name: &str| {
+        let layout = Layout::shipped(name).unwrap().with_torque(DriveMode::Torque, -3);
+        Rig::with(|config| config.assembly = Some(Assemblies::new(layout, 1).unwrap()))
+    };
+    for (name, mode, torque) in
+        [("speed", 2, None), ("speed-torque", 3, Some(0xFD)), ("speed-torque-basic", 3, Some(0xFD))]
+    {
+        let mut rig = of(name);
+        let client = rig.client(1);
+        let found = classes(&mut rig, client);
+        assert!(found.is_sorted() && found.contains(&0x2A), "{found:x?}");
+        for (instance, attribute, value) in [
+            (0, 1, vec![1, 0]),
+            (0, 2, vec![1, 0]),
+            (0, 3, vec![1, 0]),
+            (0, 6, vec![7, 0]),
+            (0, 7, vec![24, 0]),
+            (1, 6, vec![mode]),
+            (1, 22, vec![0]),
+        ] {
+            let answer = rig.ask(client, &message(GET, &path(instance, attribute), &[]));
+            assert_eq!((answer.status, answer.data), (0, value), "{name} {instance} {attribute}");
+        }
+        let answer = rig.ask(client, &message(GET, &path(1, 24), &[]));
+        assert_eq!((answer.status == 0).then_some(answer.data), torque.map(|scale| vec![scale]), "{name}");
+        for (attribute, there) in [(7, true), (8, true), (11, torque.is_some()), (12, torque.is_some())] {
+            if !there {
+                assert_eq!(rig.ask(client, &message(GET, &path(1, attribute), &[])).status, 0x14);
+                continue;
+            }
+            rig.send_unconnected(client, &message(GET, &path(1, attribute), &[]));
+            let Some(MotionRequest::Explicit(asked)) = rig.adapter.poll_motion() else { panic!("it asks") };
+            let place = ac_dc_drive::place(&asked.path).unwrap();
+            let expected = match attribute {
+                7 => Place { output: false, offset: 2 },
+                8 => Place { output: true, offset: 2 },
+                11 => Place { output: false, offset: 4 },
+                _ => Place { output: true, offset: 4 },
+            };
+            assert_eq!(place, expected);
+            let mut reply = ExplicitReply::status(asked.token, 0);
+            reply.data.try_extend_from_slice(&[attribute, 0]).unwrap();
+            rig.complete(&MotionReply::Explicit(reply));
+            assert_eq!(rig.unconnected_reply(client).0.data, [attribute, 0]);
+        }
+        for (service, path, data, status, what) in [
+            (SET, path(1, 6), &[2][..], 0x0E, "the mode is configured"),
+            (SET, path(1, 8), &[0, 0], 0x0E, "references come on the connection"),
+            (GET, path(1, 9), &[], 0x14, "no such attribute"),
+            (GET, path(0, 4), &[], 0x14, "no such class attribute"),
+            (GET, path(2, 6), &[], 0x05, "no such instance"),
+            (GET, path(1, 7), &[0], 0x15, "a read has no data"),
+            (Service::GET_ATTRIBUTES_ALL, path(1, 6), &[], 0x08, "no other service"),
+        ] {
+            assert_eq!(rig.ask(client, &message(service, &path, data)).status, status, "{what}");
+        }
+        assert_eq!(rig.adapter.poll_motion(), None, "none of them reaches the axis");
+    }
 }
 
 /// Get_Connection_Data and the Connection Entry List have the owner and those that listen, each with its number and intervals.

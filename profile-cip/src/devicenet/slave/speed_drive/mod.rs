@@ -24,13 +24,13 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 
 use self::objects::{
     AcDcDrive, Assemblies, CLASS_AC_DC_DRIVE, CLASS_ASSEMBLY, CLASS_CONTROL_SUPERVISOR, CLASS_MOTOR_DATA,
-    ControlSupervisor, MODE_TORQUE, MotorData, MotorPlate, Settings,
+    ControlSupervisor, MotorData, MotorPlate, Settings,
 };
 use self::supervisor::{Inputs, next};
 use super::super::connection::{Change, Connection, ConnectionKind, ConnectionSetup, ConnectionState};
 use super::super::fragmentation::{Body, IoData};
 use super::super::wire::speed::{
-    Assembly, SpeedActual, SpeedCommand, SpeedControl, SpeedStatus, SupervisorState,
+    Assembly, DRIVE_MODE_TORQUE, SpeedActual, SpeedCommand, SpeedControl, SpeedStatus, SupervisorState,
 };
 use super::super::wire::{MacId, Request};
 use super::application::{Application, ServiceError};
@@ -299,7 +299,7 @@ impl SpeedDrive {
             ..ServoCommand::default()
         };
         match self.state {
-            SupervisorState::ENABLED if self.settings.mode == MODE_TORQUE => {
+            SupervisorState::ENABLED if self.settings.mode == DRIVE_MODE_TORQUE => {
                 self.ramp = self.actual.velocity.0;
                 let direction = self.direction();
                 let micro =

@@ -3,7 +3,10 @@
 
 use profile_generic::servo::ServoParameters;
 
-use super::super::super::wire::speed::{Assembly, SpeedActual, SpeedCommand, SpeedStatus};
+use super::super::super::wire::speed::{
+    Assembly, DRIVE_MODE_SPEED as MODE_SPEED, DRIVE_MODE_TORQUE as MODE_TORQUE, SpeedActual, SpeedCommand,
+    SpeedStatus,
+};
 use super::SpeedDrive;
 use crate::device::objects::object::Object;
 use crate::wire::status::GeneralStatus;
@@ -14,8 +17,7 @@ pub const CLASS_ASSEMBLY: u16 = 0x04;
 pub const CLASS_MOTOR_DATA: u16 = 0x28;
 /// Class code.
 pub const CLASS_CONTROL_SUPERVISOR: u16 = 0x29;
-/// Class code.
-pub const CLASS_AC_DC_DRIVE: u16 = 0x2A;
+pub use crate::device::objects::class::CLASS_AC_DC_DRIVE;
 
 /// Motor type: permanent magnet, sinusoidal.
 const MOTOR_TYPE: u8 = 9;
@@ -68,11 +70,6 @@ impl MotorPlate {
         }
     }
 }
-
-/// `DriveMode`: closed-loop speed control.
-pub const MODE_SPEED: u8 = 2;
-/// `DriveMode`: torque control.
-pub const MODE_TORQUE: u8 = 3;
 
 impl Default for Settings {
     fn default() -> Self {
