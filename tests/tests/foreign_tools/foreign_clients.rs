@@ -356,6 +356,57 @@ fn pycomm3_reads_assemblies_without_a_connection_and_sets_none() {
     assert!(missing.starts_with("Destination unknown"), "{missing}");
 }
 
+/// The turntable of the example by a torque in 1024ths of a newton metre, with a motor of 1 Nm.
+fn by_torque(example: &str) -> String {
+    let assembly = "assembly = { layout = \"speed-torque\", drive_mode = \"torque\", torque_scale = 10 }";
+    let motor = "unwind_counts = 1_000_000     # a modulo axis: one turn has as many counts\nmotor = { rated_torque = 1.0 }";
+    let (line, _) = motor.split_once('\n').expect("two lines");
+    let text = example.replacen("power_structure_class_id = 0", assembly, 1).replacen(line, motor, 1);
+    assert!(text.contains(assembly) && text.contains(motor), "{text}");
+    text
+}
+
+/// A script drives an axis by its torque, and pycomm3 reads which reference counts and what its numbers are.
+#[test]
+fn an_axis_is_driven_by_torque_and_pycomm3_reads_what_the_numbers_count() {
+    const ADDRESS: &str = "127.0.0.59";
+    const OTHER: &str = "127.0.0.58";
+    const TEST: &str = "an_axis_is_driven_by_torque_and_pycomm3_reads_what_the_numbers_count";
+    let Some(python) = peer::python_or_skip(TEST, "pycomm3") else { return };
+    let example = with_assembly(include_str!("../../../examples/two-axes-in-process.toml"), OTHER);
+    let (mut running, capture) = start_box_of(&by_torque(&example), ADDRESS, "by-torque");
+    let got = ask(&python, "pycomm3_drive_object.py", ADDRESS);
+    for (what, value) in [
+        ("drive_mode", "03"),
+        ("speed_reference", "0000"),
+        ("torque_reference", "0000"),
+        ("speed_scale", "00"),
+        ("torque_scale", "0a"),
+    ] {
+        assert_eq!(got[what], json!({ "value": value, "error": null }), "{what}");
+    }
+    assert_eq!(got["set_mode"]["error"], "Attribute not settable");
+    assert_eq!(got["acceleration_time"]["error"], "Attribute not supported");
+
+    let script = capture.with_extension("script");
+    // 23.4 mNm: friction takes 20 mNm of it, and the rest at 5.7 revolutions a second.
+    let steps = "device = \"front\"\ninterval = \"20 ms\"\n\
+                 [[step]]\nenable = \"turntable\"\n\
+                 [[step]]\nset = { axis = \"turntable\", field = \"torque_reference\", value = 24 }\n\
+                 [[step]]\nexpect = { axis = \"turntable\", velocity = 4.0, tolerance = 3.0, within = \"10 s\" }\n\
+                 [[step]]\nset = { axis = \"turntable\", field = \"torque_reference\", value = -24 }\n\
+                 [[step]]\nexpect = { axis = \"turntable\", velocity = -4.0, tolerance = 3.0, within = \"10 s\" }\n\
+                 [[step]]\ndisable = \"turntable\"\n\
+                 [[step]]\nexpect = { axis = \"turntable\", status = [\"ready\", \"standstill\"], within = \"5 s\" }\n";
+    std::fs::write(&script, steps).expect("the scratch folder can be written");
+    let mut command = Command::new(axisbridge());
+    command.args(["simulate", "plc", "--config"]).arg(capture.with_extension("toml"));
+    let output = command.arg("--script").arg(&script).output().expect("it starts");
+    let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{}{}", said(&output.stdout), said(&output.stderr));
+    assert_eq!(running.terminate(Duration::from_secs(10)).code(), Some(0));
+}
+
 #[test]
 fn the_python_file_for_users_moves_an_axis_or_says_why_not() {
     const ADDRESS: &str = "127.0.0.70";

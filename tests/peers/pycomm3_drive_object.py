@@ -1,0 +1,47 @@
+"""What pycomm3 gets from the AC/DC Drive object of a device with speed and torque in its assemblies.
+
+Usage: pycomm3_drive_object.py ADDRESS. Prints one JSON object; judged by tests/foreign_clients.rs.
+"""
+
+import json
+import sys
+
+from pycomm3 import CIPDriver, Services
+
+DRIVE = 0x2A
+ATTRIBUTES = {
+    "drive_mode": 6,
+    "speed_actual": 7,
+    "speed_reference": 8,
+    "torque_actual": 11,
+    "torque_reference": 12,
+    "speed_scale": 22,
+    "torque_scale": 24,
+    "acceleration_time": 18,
+}
+
+
+def main(address):
+    with CIPDriver(address) as driver:
+
+        def ask(service, attribute, data=b""):
+            answer = driver.generic_message(
+                service=service,
+                class_code=DRIVE,
+                instance=1,
+                attribute=attribute,
+                request_data=data,
+                connected=False,
+                unconnected_send=False,
+                route_path=False,
+                name="request",
+            )
+            return {"value": answer.value.hex() if answer.value is not None else None, "error": answer.error}
+
+        result = {name: ask(Services.get_attribute_single, number) for name, number in ATTRIBUTES.items()}
+        result["set_mode"] = ask(Services.set_attribute_single, ATTRIBUTES["drive_mode"], b"\x02")
+    print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
