@@ -83,7 +83,6 @@ impl Finding {
 #[derive(Debug, Clone, Copy)]
 struct Last {
     cycle: i64,
-    taken: i64,
     set_point: SetPoint,
     /// Velocity, and the cycles that it was measured over; 0 for a commanded velocity.
     velocity: Option<(f64, f64)>,
@@ -117,10 +116,8 @@ struct Change {
 pub struct Instant {
     /// When it was sent.
     pub at: MonotonicTime,
-    /// The cycle that it is for.
+    /// Its cycle, and the time of one.
     pub cycle: i64,
-    /// The cycle in which the drive takes it: a later one where a SYNC of CANopen is late.
-    pub taken: i64,
     /// Time of a cycle.
     pub cycle_time: DurationNs,
     /// What differs between controller and gateway.
@@ -238,16 +235,13 @@ impl Follower {
             Leader::Other => {}
         }
         if let (Some(limit), Some(velocity)) = (instant.limit, velocity) {
-            // The drive goes this way in the cycles in which it has it.
-            let steps = last.map_or(1, |last| (instant.taken - last.taken).max(1));
-            let hurry = if over > 0.0 { over / f64_from_i64(steps) } else { 1.0 };
-            let (velocity, limit) = (velocity * hurry, limit * (1.0 + SPARE) + resolution * hurry);
+            let limit = limit * (1.0 + SPARE) + resolution;
             if velocity.abs() > limit && leader != Leader::Other {
                 found.push(Finding::new(Rule::Limit, velocity, -limit, limit, NANO));
             }
         }
         let velocity = velocity.map(|velocity| (velocity, over));
-        self.last = Some(Last { cycle: instant.cycle, taken: instant.taken, set_point, velocity, leader });
+        self.last = Some(Last { cycle: instant.cycle, set_point, velocity, leader });
         found
     }
 
@@ -379,15 +373,7 @@ mod tests {
             let follows = Some(set_point).filter(|_| cycle > 40);
             let reading = Reading { mark: 0, follows, actual_counts: counts, actual_velocity: 0.0 };
             let skew = Skew { synchronous: true, ..Skew::default() };
-            let instant = Instant {
-                at,
-                cycle,
-                taken: cycle,
-                cycle_time: CYCLE,
-                skew,
-                period: PERIOD,
-                limit: Some(5e9),
-            };
+            let instant = Instant { at, cycle, cycle_time: CYCLE, skew, period: PERIOD, limit: Some(5e9) };
             let new =
                 follower.take(&reading, &SCALING, Leader::Controller, &curve, &instant, &mut statistics);
             found.extend(new.into_iter().map(|found| found.rule));
@@ -420,7 +406,6 @@ mod tests {
         };
         let instant = |cycle| Instant {
             at: MonotonicTime::ZERO + CYCLE * cycle,
-            taken: cycle,
             cycle,
             cycle_time: CYCLE,
             skew: Skew::default(),
@@ -440,51 +425,33 @@ mod tests {
         assert_eq!((found[0].rule, found[0].value), (Rule::Begin, 100.0 * 1_000.0 / 1e9));
     }
 
-    /// What is found in sixty set-points, each for a cycle and taken in another.
-    fn found_of(cycles: fn(i64) -> (i64, i64), counts: fn(i64) -> i64) -> Vec<Rule> {
-        let (mut follower, mut found) = (Follower::default(), Vec::new());
-        for number in 0..60 {
-            let ((cycle, taken), counts) = (cycles(number), counts(number));
-            let set_point = SetPoint { quantity: Quantity::Position, counts, value: 0.0 };
-            let reading =
-                Reading { mark: 0, follows: Some(set_point), actual_counts: counts, actual_velocity: 0.0 };
-            let instant = Instant {
-                at: MonotonicTime::ZERO + CYCLE * cycle,
-                cycle,
-                taken,
-                cycle_time: CYCLE,
-                skew: Skew::default(),
-                period: PERIOD,
-                limit: Some(5e9),
-            };
-            let (curve, mut statistics) = (Curve::default(), Statistics::default());
-            let leader = Leader::Bounded(10e9);
-            found.extend(follower.take(&reading, &SCALING, leader, &curve, &instant, &mut statistics));
-        }
-        found.into_iter().map(|found| found.rule).collect()
-    }
-
-    /// A pause between a set-point and the SYNC that it is for: the curve is what it was, and the drive makes up for the pause in one
-    /// cycle, which only the limit of velocity ends.
-    #[test]
-    fn a_late_sync_bends_no_curve_and_hurries_the_drive() {
-        // Set-point 30 is taken three cycles late, the next one in the cycle behind it.
-        let late = |number: i64| match number {
-            30 => (30, 33),
-            number if number > 30 => (number + 3, number + 3),
-            number => (number, number),
-        };
-        // 1000 counts in a cycle of 2 ms are half a unit per second, four times of it two.
-        assert_eq!(found_of(late, |number| 1_000 * (if number > 30 { number + 3 } else { number })), []);
-        let fast = found_of(late, |number| 3_000 * (if number > 30 { number + 3 } else { number }));
-        assert_eq!(fast, [Rule::Limit], "four times 1.5 units per second");
-        // The drive stands at a place that the curve had left: that is a bend of the curve as well.
-        assert!(found_of(late, |number| 1_000 * number).contains(&Rule::Acceleration));
-    }
-
     #[test]
     fn a_controller_without_a_curve_is_held_to_its_limits() {
-        let found = |counts: fn(i64) -> i64| found_of(|cycle| (cycle, cycle), counts);
+        let found = |counts: fn(i64) -> i64| {
+            let (mut follower, mut found) = (Follower::default(), Vec::new());
+            for cycle in 0..60 {
+                let counts = counts(cycle);
+                let set_point = SetPoint { quantity: Quantity::Position, counts, value: 0.0 };
+                let reading = Reading {
+                    mark: 0,
+                    follows: Some(set_point),
+                    actual_counts: counts,
+                    actual_velocity: 0.0,
+                };
+                let instant = Instant {
+                    at: MonotonicTime::ZERO + CYCLE * cycle,
+                    cycle,
+                    cycle_time: CYCLE,
+                    skew: Skew::default(),
+                    period: PERIOD,
+                    limit: Some(5e9),
+                };
+                let (curve, mut statistics) = (Curve::default(), Statistics::default());
+                let leader = Leader::Bounded(10e9);
+                found.extend(follower.take(&reading, &SCALING, leader, &curve, &instant, &mut statistics));
+            }
+            found.into_iter().map(|found| found.rule).collect::<Vec<_>>()
+        };
         // 40 counts more in each cycle of 2 ms are 10 units/s².
         assert_eq!(found(|cycle| 20 * cycle * cycle), []);
         assert!(found(|cycle| 50 * cycle * cycle).contains(&Rule::Acceleration), "25 units/s²");

@@ -119,8 +119,6 @@ struct Axis {
     limit: Option<f64>,
     acceleration: Option<f64>,
     grid: Grid,
-    /// The cycle of the last SYNC, on CANopen.
-    synced: Option<i64>,
     scaling: Option<Scaling>,
     mark: Option<u64>,
     curve: Curve,
@@ -183,7 +181,6 @@ impl MotionChecker {
                 limit: axis.limits.velocity.map(|limit| f64_from_i64(limit.get())),
                 acceleration: axis.limits.acceleration.map(|limit| f64_from_i64(limit.get())),
                 grid: Grid::new(cycle),
-                synced: None,
                 scaling: None,
                 mark: None,
                 curve: Curve::default(),
@@ -357,7 +354,7 @@ impl MotionChecker {
         let stepped = steps.into_iter().any(|(at, _)| *at >= self.connected_at);
         for axis in &mut self.axes {
             let Some((reading, scaling, sent)) = read_scaled(axis, rig) else {
-                (axis.mark, axis.synced) = (None, None);
+                axis.mark = None;
                 axis.follower.lose();
                 continue;
             };
@@ -371,14 +368,7 @@ impl MotionChecker {
             let call = self.calls.iter().rev().find(made);
             let of_sent = self.calls.iter().rev().find(|call| call.at <= sent);
             let late = of_sent.map_or(DurationNs::ZERO, |call| call.late);
-            let taken = axis.grid.sent(sent, late > DurationNs::ZERO);
-            // It is for the cycle behind that of the SYNC that it followed. When the gateway pauses, the next SYNC is late, and the
-            // drive has the set-point late with it: the curve through the set-points is the same, and nothing can be done about
-            // what is under way. How far the drive has to go in one cycle then is judged by the limit of velocity.
-            let cycle = match bus {
-                BusKind::Canopen => axis.synced.replace(taken).map_or(taken, |before| before + 1),
-                _ => taken,
-            };
+            let cycle = axis.grid.sent(sent, late > DurationNs::ZERO);
             let leader =
                 call.and_then(|call| call.leaders.get(axis.number)).copied().unwrap_or(Leader::Other);
             // The pull of this very cycle.
@@ -386,7 +376,6 @@ impl MotionChecker {
             let instant = Instant {
                 at: call.map_or(sent, |call| call.at),
                 cycle,
-                taken,
                 cycle_time,
                 skew,
                 period: self.period,

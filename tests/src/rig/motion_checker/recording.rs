@@ -126,7 +126,6 @@ pub fn judge(
                 let instant = Instant {
                     at: at - lateness - LEAD,
                     cycle,
-                    taken: cycle,
                     cycle_time: sercos.cycle_time,
                     skew: Skew { synchronous, offset: DurationNs::ZERO, drift: SLEWS },
                     period,
