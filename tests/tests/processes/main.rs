@@ -11,6 +11,7 @@ mod init;
 mod local;
 mod package;
 mod page;
+mod page_parameters;
 mod param;
 mod recording;
 mod reload;
