@@ -17,4 +17,5 @@ mod recording;
 mod reload;
 mod scripts;
 mod size;
+mod systemd;
 mod two_clocks;
