@@ -8,6 +8,7 @@ mod blocks;
 pub mod can;
 pub mod can_bus;
 pub mod reader;
+mod record;
 pub mod recorder;
 pub mod synth;
 pub mod writer;
@@ -74,6 +75,11 @@ impl Side {
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         Self::all(CAN_BUSES_MAX).find(|side| side.name() == name)
+    }
+
+    /// The side at a place in [`Side::all`]; `None` beyond the last.
+    pub(crate) fn of_index(index: u8) -> Option<Self> {
+        Self::all(CAN_BUSES_MAX).nth(usize::from(index))
     }
 
     /// Its place in [`Side::all`].

@@ -1,6 +1,6 @@
 //! Records what the box sends and receives, without the cycle thread ever waiting for a disk.
 //!
-//! Whoever sees traffic holds a [`Tap`]: a queue of fixed-size records to one recorder thread. Pushing copies
+//! Whoever sees traffic holds a [`Tap`]: a queue of records ([`super::record`]) to one recorder thread. Pushing copies
 //! the bytes and returns; when the queue is full the record is dropped and counted. The recorder thread takes
 //! the oldest record of all taps and dresses socket payloads up as frames ([`super::synth`]). The frames go to
 //! a file, up to a limit of bytes, and to a [`FrameSink`].
@@ -15,9 +15,10 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use profile_generic::can::Frame;
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Producer, RingBuffer};
 
-use super::can::{self, RECORD_LEN_MAX};
+use super::can;
+use super::record::{self, Head, Kind, RECORD_LEN_MAX, Records, len_in_queue};
 use super::synth::{DATAGRAM_LEN_MAX, SEGMENT_LEN_MAX, Synthesizer};
 use super::writer::Writer;
 use super::{FRAME_LEN_MAX, Side};
@@ -70,7 +71,7 @@ pub struct Settings {
     pub path: PathBuf,
     /// Its interfaces.
     pub interfaces: Interfaces,
-    /// Records each tap can hold until the recorder thread takes them; each takes about 1.5 KiB.
+    /// Records of the greatest length, about 1.5 KiB, that each tap can hold until the recorder thread takes them; of shorter ones more.
     pub depth: usize,
     /// Bytes of the file at which recording ends; what comes after counts as dropped.
     pub file_len_max: u64,
@@ -98,15 +99,6 @@ pub struct Summary {
     pub dropped: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Kind {
-    Frame(Side),
-    Datagram { from: SocketAddrV4, to: SocketAddrV4, tos: u8 },
-    Opened { client: SocketAddrV4, server: SocketAddrV4 },
-    Stream { from: SocketAddrV4, to: SocketAddrV4 },
-    Closed { from: SocketAddrV4, to: SocketAddrV4 },
-}
-
 /// Takes frames on the recorder thread, which may lock and allocate.
 pub trait FrameSink: Send {
     /// A round of the recorder thread begins: it comes at least every few milliseconds. `lost` records were dropped so far.
@@ -116,27 +108,10 @@ pub trait FrameSink: Send {
     fn frame(&mut self, at: KernelTime, side: Side, frame: &[u8]);
 }
 
-impl Kind {
-    const fn side(self) -> Side {
-        match self {
-            Self::Frame(side) => side,
-            _ => Side::North,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Record {
-    at: KernelTime,
-    kind: Kind,
-    len: u16,
-    data: [u8; FRAME_LEN_MAX],
-}
-
 /// One place where traffic is seen.
 #[derive(Debug)]
 pub struct Tap {
-    queue: Producer<Record>,
+    queue: Producer<u8>,
     dropped: Arc<[AtomicU64; SIDES]>,
 }
 
@@ -148,7 +123,7 @@ impl Tap {
 
     /// A frame of a CAN bus.
     pub fn can_frame(&mut self, at: KernelTime, bus: u8, frame: &Frame) {
-        let mut record = [0; RECORD_LEN_MAX];
+        let mut record = [0; can::RECORD_LEN_MAX];
         let len = can::emit(frame, &mut record);
         self.push(at, Kind::Frame(Side::Can(bus)), &record[..len]);
     }
@@ -188,10 +163,7 @@ impl Tap {
     }
 
     fn push(&mut self, at: KernelTime, kind: Kind, bytes: &[u8]) {
-        let mut record =
-            Record { at, kind, len: u16::try_from(bytes.len()).unwrap_or(0), data: [0; FRAME_LEN_MAX] };
-        record.data[..bytes.len()].copy_from_slice(bytes);
-        if self.queue.push(record).is_err() {
+        if !record::push(&mut self.queue, at, kind, bytes) {
             self.drop_one(kind);
         }
     }
@@ -223,7 +195,7 @@ impl Recorder {
         Self::start_with(Some(settings), None, depth, taps)
     }
 
-    /// The same, with frames to a file, to a sink, or to both. Each tap holds `depth` records.
+    /// The same, with frames to a file, to a sink, or to both. Each tap holds `depth` records of the greatest length.
     ///
     /// # Errors
     /// The file cannot be created, or the thread not started.
@@ -238,9 +210,9 @@ impl Recorder {
         let mut queues = Vec::with_capacity(taps);
         let mut ends = Vec::with_capacity(taps);
         for _ in 0..taps {
-            let (producer, consumer) = RingBuffer::new(depth);
+            let (producer, consumer) = RingBuffer::new(depth.saturating_mul(RECORD_LEN_MAX));
             ends.push(Tap { queue: producer, dropped: Arc::clone(&lost) });
-            queues.push(consumer);
+            queues.push(Records::new(consumer));
         }
         let stop = Arc::new(AtomicBool::new(false));
         let task = Task { queues, lost, synth: Synthesizer::new(), file, sink };
@@ -313,7 +285,7 @@ impl FileEnd {
 
 /// The recorder thread.
 struct Task {
-    queues: Vec<Consumer<Record>>,
+    queues: Vec<Records>,
     lost: Arc<[AtomicU64; SIDES]>,
     synth: Synthesizer,
     file: Option<FileEnd>,
@@ -323,6 +295,7 @@ struct Task {
 impl Task {
     fn run(mut self, stop: &AtomicBool) -> io::Result<Summary> {
         let mut last = KernelTime(0);
+        let mut buffer = [0; FRAME_LEN_MAX];
         loop {
             // Read before draining: what was pushed before the request to stop is still written.
             let stopping = stop.load(Ordering::Acquire);
@@ -330,16 +303,20 @@ impl Task {
                 sink.round(self.lost.iter().map(|counter| counter.load(Ordering::Relaxed)).sum());
             }
             // Bounded by what the queues hold, so that a flood cannot keep the thread from stopping.
-            let waiting: usize = self.queues.iter().map(Consumer::slots).sum();
-            for _ in 0..waiting {
-                let Some(record) = self.oldest() else { break };
-                last = last.max(record.at);
-                self.take(&record);
+            let waiting: usize = self.queues.iter().map(Records::waiting).sum();
+            let mut left = waiting;
+            while left > 0 {
+                let Some(index) = self.oldest() else { break };
+                let Some((head, bytes)) = self.queues[index].take(&mut buffer) else { break };
+                last = last.max(head.at);
+                left = left.saturating_sub(len_in_queue(&head));
+                self.take(&head, bytes);
             }
             if stopping {
                 break;
             }
-            if waiting == 0 {
+            // Nothing waits, or the rest of a record is on its way.
+            if left == waiting {
                 std::thread::sleep(IDLE);
             }
         }
@@ -347,17 +324,15 @@ impl Task {
         self.file.map_or(Ok(Summary::default()), |file| file.finish(last, lost))
     }
 
-    /// Takes the record with the smallest time at the head of any queue.
-    fn oldest(&mut self) -> Option<Record> {
-        let heads = self.queues.iter().enumerate();
-        let times = heads.filter_map(|(index, queue)| Some((queue.peek().ok()?.at, index)));
-        let (_, index) = times.min()?;
-        self.queues[index].pop().ok()
+    /// The queue whose next record has the smallest time.
+    fn oldest(&mut self) -> Option<usize> {
+        let heads = self.queues.iter_mut().enumerate();
+        let times = heads.filter_map(|(index, queue)| Some((queue.next()?.at, index)));
+        times.min().map(|(_, index)| index)
     }
 
-    fn take(&mut self, record: &Record) {
+    fn take(&mut self, record: &Head, data: &[u8]) {
         let side = record.kind.side();
-        let data = &record.data[..usize::from(record.len)];
         let Self { synth, file, sink, lost, .. } = self;
         let mut file = file.as_mut();
         if !file.as_mut().is_some_and(|file| file.takes(side)) {

@@ -36,6 +36,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     log_to_stderr(good.config.log_level, &events);
     let in_memory = Histories { events: Arc::clone(&events), ..Histories::default() };
     tell(&findings);
+    // They have the texts of all tables, megabytes that would stay in memory while the gateway runs.
+    drop(findings);
     let [stop, hurry] = super::signal::stop_and_hurry_on_signals()?;
     let asked = Asked { stop, hurry, reload: super::signal::reload_on_hang_up()? };
     info!(name = good.config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");

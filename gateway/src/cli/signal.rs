@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::CliError;
-use crate::sys::thread::{self, SMALL_STACK};
+use crate::sys::thread::{self, WAITING_STACK};
 
 /// A flag that the first SIGINT or SIGTERM sets; a second one ends the process at once.
 pub fn stop_on_signals() -> Result<Arc<AtomicBool>, CliError> {
@@ -22,7 +22,7 @@ fn flags_on_signals<const N: usize>() -> Result<[Arc<AtomicBool>; N], CliError> 
     let flags: [Arc<AtomicBool>; N] = std::array::from_fn(|_| Arc::default());
     let own = flags.clone();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    thread::named("axisbridge-signals", SMALL_STACK).spawn(move || {
+    thread::named("axisbridge-signals", WAITING_STACK).spawn(move || {
         runtime.block_on(async {
             use tokio::signal::unix::{SignalKind, signal};
             let (Ok(mut interrupt), Ok(mut terminate)) =
@@ -50,7 +50,7 @@ pub fn reload_on_hang_up() -> Result<Arc<AtomicBool>, CliError> {
     let reload = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&reload);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    thread::named("axisbridge-reload", SMALL_STACK).spawn(move || {
+    thread::named("axisbridge-reload", WAITING_STACK).spawn(move || {
         runtime.block_on(async {
             use tokio::signal::unix::{SignalKind, signal};
             let Ok(mut hang_up) = signal(SignalKind::hangup()) else { return };

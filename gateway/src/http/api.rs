@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use super::control;
 use super::downloads::{self, ContactList};
 use super::login::{self, Offer, Opened};
+use super::parameters::{self, ParameterAnswers, ParameterList};
 use super::sheet::AxisSheet;
 use super::traces::{AxisTraces, TimeTraces};
 use super::view::{FaultList, HTTP_FAULTS_MAX, HTTP_LINES_MAX, LogLines, Look};
@@ -32,6 +33,8 @@ pub fn openapi() -> Value {
     let contacts = generator.subschema_for::<ContactList>();
     let offer = generator.subschema_for::<Offer>();
     let opened = generator.subschema_for::<Opened>();
+    let parameter_list = generator.subschema_for::<ParameterList>();
+    let parameter_answers = generator.subschema_for::<ParameterAnswers>();
     let schemas = generator.take_definitions(false);
     let json = |schema: &schemars::Schema| json!({ "application/json": { "schema": schema } });
     let text = |kind: &str| json!({ kind: { "schema": { "type": "string" } } });
@@ -151,7 +154,8 @@ pub fn openapi() -> Value {
     });
     description["paths"]["/api/v1/session"] = login::describe(&json!(offer), &json!(opened));
     description["paths"]["/api/v1/control"] = control::describe();
-    for (path, described) in downloads::describe(&json!(contacts)) {
+    let of_drives = parameters::describe(&json!(parameter_list), &json!(parameter_answers));
+    for (path, described) in downloads::describe(&json!(contacts)).into_iter().chain(of_drives) {
         description["paths"][path] = described;
     }
     description
@@ -186,6 +190,9 @@ mod tests {
             refused: vec![RefusedService::default()],
             ..Contact::default()
         };
+        for (name, answer) in super::parameters::tests::examples() {
+            compare(&description, &description["components"]["schemas"][name], &answer, name);
+        }
         let contacts = serde_json::to_value(ContactList { contacts: vec![contact] }).unwrap();
         compare(&description, &description["components"]["schemas"]["ContactList"], &contacts, "ContactList");
         let reference = &description["paths"]["/api/v1/status"]["get"]["responses"]["200"]["content"]["application/json"]

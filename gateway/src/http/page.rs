@@ -12,6 +12,7 @@ pub const JS: &str = concat!(
     include_str!("page/charts.js"),
     include_str!("page/control.js"),
     include_str!("page/axis.js"),
+    include_str!("page/parameters.js"),
     include_str!("page/bus.js"),
     include_str!("page/time.js"),
     include_str!("page/mapping.js"),

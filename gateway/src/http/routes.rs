@@ -22,6 +22,7 @@ use super::events::Events;
 use super::login::{self, Gate};
 use super::metrics::metrics;
 use super::page;
+use super::parameters::{self, Readers};
 use super::server::Load;
 use super::view::{HTTP_LINES_MAX, View};
 use crate::local::protocol::{BadRequest, after_query, axis_query, fault_query, log_query, trace_query};
@@ -54,6 +55,8 @@ pub struct Sources {
     pub load: Arc<Load>,
     /// One file is made and sent at a time.
     pub downloads: Arc<Semaphore>,
+    /// The parameters of drives; `None` where nobody can ask the engine.
+    pub readers: Option<Arc<Readers>>,
     /// Control of the axes; `None` without a token.
     pub gate: Option<Arc<Gate>>,
     /// Whether connections are encrypted.
@@ -80,6 +83,7 @@ pub fn routes(sources: Sources) -> Router {
         .route("/api/v1/configuration", get(configuration))
         .route("/api/v1/session", login::route())
         .route("/api/v1/control", get(control::control))
+        .merge(parameters::routes())
         .merge(downloads::routes())
         .route("/api/v1/openapi.json", get(async || typed(JSON, openapi().to_string())))
         .fallback(async || (StatusCode::NOT_FOUND, typed(TEXT, "there is nothing at this path\n")))
@@ -190,7 +194,7 @@ fn file(kind: &'static str, name: &str, body: impl IntoResponse) -> Response {
 }
 
 /// The object has texts, numbers and lists, and nothing that JSON does not know.
-fn json(object: &impl Serialize) -> Response {
+pub(super) fn json(object: &impl Serialize) -> Response {
     typed(JSON, serde_json::to_string(object).unwrap_or_default())
 }
 

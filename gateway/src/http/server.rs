@@ -23,6 +23,7 @@ use super::access::Token;
 use super::events::Events;
 use super::limits::{HEADER_TIME_OUT, Peer, STALL_TIME_OUT, builder};
 use super::login::{Gate, Remote};
+use super::parameters::Readers;
 use super::routes::{Sources, routes};
 use super::view::View;
 use crate::line_limit::{LineKind, LineLimit, Peer as LinePeer};
@@ -48,6 +49,7 @@ pub struct HttpServer {
     limit: Arc<LineLimit>,
     tls: Option<Arc<ServerConfig>>,
     control: Option<(Token, Door)>,
+    parameters: Option<Door>,
 }
 
 /// A server that answers until this is dropped.
@@ -110,6 +112,7 @@ impl HttpServer {
             limit: Arc::default(),
             tls: None,
             control: None,
+            parameters: None,
         })
     }
 
@@ -135,6 +138,12 @@ impl HttpServer {
     #[must_use]
     pub fn control(self, token: Token, door: Door) -> Self {
         Self { control: Some((token, door)), ..self }
+    }
+
+    /// Lets everybody read the parameters of drives, through this door.
+    #[must_use]
+    pub fn read_parameters(self, door: Door) -> Self {
+        Self { parameters: Some(door), ..self }
     }
 
     /// Where it listens.
@@ -187,6 +196,7 @@ impl HttpServer {
             events: Arc::clone(&events),
             load: Arc::clone(&load),
             downloads: Arc::new(Semaphore::new(1)),
+            readers: self.parameters.map(|door| Arc::new(Readers::new(door))),
             gate: self.control.map(|(token, door)| Arc::new(Gate::new(token, door, Arc::clone(&self.limit)))),
             encrypted: self.tls.is_some(),
         });

@@ -275,10 +275,11 @@ fn every_path_of_the_description_is_answered_and_no_other() {
     let description: Value = serde_json::from_str(&answer.body).unwrap();
     assert_eq!(description, openapi());
     let paths: Vec<&String> = description["paths"].as_object().unwrap().keys().collect();
-    assert_eq!(paths.len(), 22);
+    assert_eq!(paths.len(), 24);
     for path in paths {
         let needed = match path.as_str() {
-            "/api/v1/traces" | "/api/v1/axis" => "?axis=slide",
+            "/api/v1/traces" | "/api/v1/axis" | "/api/v1/parameters" => "?axis=slide",
+            "/api/v1/parameter" => "?axis=slide&id=S-0-0104",
             "/api/v1/eds" => "?device=back",
             _ => "",
         };

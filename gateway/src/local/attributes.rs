@@ -10,7 +10,7 @@ use crate::config::{Axis, Config};
 use crate::engine::Engine;
 use crate::engine::build::scaling;
 use crate::engine::programs::Programs;
-use crate::mapping::{AttributeTable, AttributeTruth, Mapping};
+use crate::mapping::{AttributeTruth, CipScaling, Mapping};
 
 /// An attribute, as the line `attribute` has it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,8 +43,8 @@ impl From<&AttributeTruth<'_>> for AttributeLine {
 #[derive(Debug, Clone)]
 pub struct Attributes {
     mapping: Arc<Mapping>,
-    /// Those of each axis; `None` where no CIP Motion device has it.
-    tables: Vec<Option<AttributeTable>>,
+    /// The scaling of each axis; `None` where no CIP Motion device has it. Tables are made when they are asked for: they would take 47 kB an axis.
+    scalings: Vec<Option<CipScaling>>,
     programs: Programs,
 }
 
@@ -53,31 +53,32 @@ impl Attributes {
     #[must_use]
     pub fn of(config: &Config, engine: &Engine) -> Self {
         let mapping = engine.shared_mapping();
-        let table = |axis: &Axis| {
+        let of_motion = |axis: &Axis| {
             let of_motion = config.devices.get(axis.device).is_some_and(|device| device.assembly.is_none());
-            of_motion.then(|| mapping.attribute_table(&scaling(axis))).flatten()
+            of_motion.then(|| scaling(axis))
         };
-        let tables = config.axes.iter().map(table).collect();
-        Self { mapping, tables, programs: engine.programs() }
+        let scalings = config.axes.iter().map(of_motion).collect();
+        Self { mapping, scalings, programs: engine.programs() }
     }
 
     /// Those of axes that no CIP Motion device has.
     #[cfg(test)]
     pub(super) fn of_nobody(axes: usize) -> Self {
         let mapping = Arc::new(Mapping::embedded().expect("the shipped tables are sound"));
-        Self { mapping, tables: vec![None; axes], programs: Programs::default() }
+        Self { mapping, scalings: vec![None; axes], programs: Programs::default() }
     }
 
     /// The reply to `attributes`: a line for each, and one that ends the list.
     #[must_use]
     pub fn reply(&self, axis: usize, name: &str) -> String {
-        let Some(Some(table)) = self.tables.get(axis) else {
+        let scaling = self.scalings.get(axis).copied().flatten();
+        let Some(table) = scaling.and_then(|scaling| self.mapping.attribute_table(&scaling)) else {
             return format!("error attributes {name} no-attributes: no CIP Motion device has the axis\n");
         };
         let Some(program) = self.programs.get(axis) else {
             return format!("error attributes {name} unanswered: the drive is not commissioned\n");
         };
-        let truths = self.mapping.truths(table, &program);
+        let truths = self.mapping.truths(&table, &program);
         let mut text = protocol::rows("attribute", truths.iter().map(AttributeLine::from));
         let _ = writeln!(text, "ok attributes {}", truths.len());
         text

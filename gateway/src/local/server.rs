@@ -567,7 +567,7 @@ pub(crate) mod tests {
             bench.direct.1.push(DirectAnswer { client, id, result, data: buffer }).unwrap();
         }
         let expected = "ok read x {\"id\":\"S-0-0104\",\"name\":\"Own name\",\"type\":\"2 byte unsigned, 2 decimals\",\
-                        \"attribute\":\"0x02110001\",\"value\":\"1.50\",\"data\":\"9600\"}\n";
+                        \"attribute\":\"0x02110001\",\"writable\":\"without torque\",\"value\":\"1.50\",\"data\":\"9600\"}\n";
         assert_eq!(hear(&mut client).await, expected);
         // The answer to a client that is gone is for nobody, and the next client is served.
         say(&mut client, "read x S-0-0104\n").await;

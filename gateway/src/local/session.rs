@@ -142,13 +142,28 @@ impl Session {
         made.map_err(|text| format!("error {} - recording: {text}\n", wanted.word()))
     }
 
-    /// Writes down who has given which order. A jog that goes on is one order.
+    /// Writes down who has given which order, or written which parameter. A jog that goes on is one order.
     fn write_down(&mut self, accepted: &Accepted) {
-        let What::Order(order) = &accepted.what else { return };
-        let (axis, order) = (accepted.axis, order.name());
+        let (order, parameter) = match &accepted.what {
+            What::Order(order) => (order.name(), None),
+            What::Parameter(named, Some(_)) => ("write", Some(named.name.clone())),
+            What::Drive(job) => match job.written() {
+                Some(id) => ("write", Some(id.to_string())),
+                None => return,
+            },
+            What::Parameter(_, None) => return,
+        };
+        let axis = accepted.axis;
         let Some(left_out) = self.written.admits(Instant::now(), (axis, order)) else { return };
         let axis = self.shared.names.get(axis).map_or("-", String::as_str);
         let (client, from) = (self.id, self.who);
+        if let Some(parameter) = parameter {
+            match left_out {
+                0 => info!(axis, parameter, client, %from, "local control: {order}"),
+                _ => info!(axis, parameter, client, %from, left_out, "local control: {order}"),
+            }
+            return;
+        }
         match left_out {
             0 => info!(axis, client, %from, "local control: {order}"),
             _ => info!(axis, client, %from, left_out, "local control: {order}"),

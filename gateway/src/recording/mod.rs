@@ -44,17 +44,17 @@ const INBOX_MAX: usize = 1_024;
 /// Least time from one writing of the contacts to the next: a controller that is refused again and again wears no disk.
 const SAVE_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Most records that the queue of a place where traffic is seen can hold: the recorder thread may be late by tens of
+/// Most records of the greatest length that the queue of a place where traffic is seen can hold: the recorder thread may be late by tens of
 /// milliseconds.
 pub const DEPTH: usize = 256;
 
 /// Fewest records of a queue: a cycle of each bus and update, and the segments of an answer.
 const DEPTH_MIN: usize = 64;
 
-/// Records of all queues together, as long as each has its fewest: about 3 MB.
-const RECORDS_MAX: usize = 2_048;
+/// Records of the greatest length of all queues together, as long as each has its fewest: 1.6 MB.
+const RECORDS_MAX: usize = 1_024;
 
-/// Records that each of so many queues can hold.
+/// Records of the greatest length that each of so many queues can hold.
 #[must_use]
 pub fn depth(queues: usize) -> usize {
     (RECORDS_MAX / queues.max(1)).clamp(DEPTH_MIN, DEPTH)

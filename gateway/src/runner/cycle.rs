@@ -12,6 +12,7 @@ use crate::engine::axis::STOP_TIME_OUT;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::port::{NorthPort, SouthPort};
 use crate::sys::clock;
+use crate::sys::memory::return_freed_memory;
 use crate::sys::realtime;
 use crate::sys::thread::{self, STACK};
 use crate::time::feed::TimeFeed;
@@ -71,6 +72,7 @@ impl CycleThread {
         let realtime = Arc::new(OnceLock::new());
         let (wish, told) = (Arc::clone(&asked), Arc::clone(&realtime));
         let thread = thread::named("axisbridge-cycle", STACK).spawn(move || {
+            return_freed_memory();
             let report = realtime::apply(&setup.realtime);
             let _ = told.set(report.refused().map(ToString::to_string).collect::<Vec<_>>().join("; "));
             run(setup, &wish)

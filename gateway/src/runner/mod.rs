@@ -398,8 +398,7 @@ pub fn start(
         histories: histories.clone(),
         recording: recording.clone(),
     });
-    let has_token = config.http.as_ref().is_some_and(|http| http.token.is_some());
-    let door = (extras.local.is_some() || has_token).then(|| {
+    let door = (extras.local.is_some() || config.http.is_some()).then(|| {
         let shared = Shared {
             names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
             parameters: NamedParameter::of(engine.mapping()),
@@ -476,6 +475,9 @@ fn serve_http(
     let failed = |source| StartError::Http { address: http.listen, source };
     let server = HttpServer::bind(http.listen, http.connections_max).map_err(failed)?;
     let mut server = server.serve(http.clients.clone()).limit_lines(Arc::clone(limit));
+    if let Some(door) = door {
+        server = server.read_parameters(door.clone());
+    }
     let (encrypted, control) = (tls.is_some(), token.is_some());
     if let Some(tls) = tls {
         server = server.encrypt(tls);

@@ -12,3 +12,11 @@ pub fn return_large_blocks() {
     // SAFETY: the call takes two numbers and changes only how the allocator gets memory from now on. A refusal leaves it as it is.
     let _ = unsafe { libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE) };
 }
+
+/// Gives back what was freed until now. Called once, before the memory is locked: from then on nothing goes back, because the system keeps
+/// locked pages.
+pub fn return_freed_memory() {
+    #[cfg(target_env = "gnu")]
+    // SAFETY: the call takes a number of bytes to keep and gives free memory of the allocator back. Nobody has references to that.
+    let _ = unsafe { libc::malloc_trim(0) };
+}

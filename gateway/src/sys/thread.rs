@@ -5,8 +5,11 @@
 
 use std::thread::Builder;
 
+/// Bytes of the stack of a thread that waits for a signal and sets a flag.
+pub const WAITING_STACK: usize = 64 * 1_024;
+
 /// Bytes of the stack of a thread that does one small thing.
-pub const SMALL_STACK: usize = 512 * 1_024;
+pub const SMALL_STACK: usize = 384 * 1_024;
 
 /// Bytes of the stack of a thread that runs the cycle, or answers requests.
 pub const STACK: usize = 1_024 * 1_024;

@@ -1,7 +1,12 @@
 //! Whole cycles of the engine with axes in motion, in virtual time.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use axisbridge::capture::Side;
+use axisbridge::capture::recorder::{FrameSink, Recorder};
+use axisbridge::sys::clock::KernelTime;
 use axisbridge_tests::rig::many::{Crowd, Many, all};
 use axisbridge_tests::rig::motion::{SLIDE_END, TURNTABLE, TURNTABLE_END, both, moves};
 use axisbridge_tests::rig::{Rig, Settings, UPDATE_PERIOD_US};
@@ -44,6 +49,47 @@ pub fn crowd(axes: usize) -> Many {
     many
 }
 
+/// A rolling recording of what a gateway receives and sends, as `[recording]` has it by default.
+pub struct Rolling {
+    recorder: Recorder,
+    frames: Arc<AtomicU64>,
+    lost: Arc<AtomicU64>,
+}
+
+/// Counts the frames of the recorder thread.
+struct Counter {
+    frames: Arc<AtomicU64>,
+    lost: Arc<AtomicU64>,
+}
+
+impl FrameSink for Counter {
+    fn round(&mut self, lost: u64) {
+        self.lost.store(lost, Ordering::Relaxed);
+    }
+
+    fn frame(&mut self, _: KernelTime, _: Side, _: &[u8]) {
+        self.frames.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Lets a recorder thread take what the ports of a rig see.
+#[must_use]
+pub fn record(many: &mut Many) -> Rolling {
+    let (frames, lost) = (Arc::<AtomicU64>::default(), Arc::<AtomicU64>::default());
+    let sink = Box::new(Counter { frames: Arc::clone(&frames), lost: Arc::clone(&lost) });
+    // The benchmark runs thousands of cycles in the time of a few: queues with room for what the recorder thread has not taken yet.
+    let (recorder, taps) = Recorder::start_with(None, Some(sink), 4_096, many.taps()).expect("a thread");
+    many.record(taps);
+    Rolling { recorder, frames, lost }
+}
+
+/// Ends a recording, which has taken every frame: what is dropped costs the cycle less.
+pub fn assert_complete(Rolling { recorder, frames, lost }: Rolling) {
+    recorder.finish().expect("there is no file");
+    let counted = [frames, lost].map(|counter| counter.load(Ordering::Relaxed));
+    assert!(counted[0] > 0 && counted[1] == 0, "frames and lost ones: {counted:?}");
+}
+
 /// Runs a call and gives the time that it took.
 fn timed(call: &mut dyn FnMut()) -> Duration {
     let start = Instant::now();
@@ -63,7 +109,8 @@ fn whole_chain(rig: &mut Rig, count: u64) -> Duration {
 /// Benches of this module.
 pub fn bench(criterion: &mut Criterion) {
     two_axes(criterion);
-    by_axes(criterion);
+    by_axes(criterion, false);
+    by_axes(criterion, true);
 }
 
 fn two_axes(criterion: &mut Criterion) {
@@ -82,11 +129,13 @@ fn two_axes(criterion: &mut Criterion) {
 }
 
 /// The engine alone, by the number of its axes: the simulated drives, the network and the controllers are not counted.
-fn by_axes(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("engine_cycle");
+fn by_axes(criterion: &mut Criterion, recorded: bool) {
+    let mut group =
+        criterion.benchmark_group(if recorded { "engine_cycle_recorded" } else { "engine_cycle" });
     group.sample_size(20);
     for axes in AXES {
         let mut many = crowd(axes);
+        let recording = recorded.then(|| record(&mut many));
         group.throughput(Throughput::Elements(u64::try_from(axes).unwrap_or(u64::MAX)));
         group.bench_function(BenchmarkId::from_parameter(axes), |bencher| {
             bencher.iter_custom(|count| (0..count).map(|_| many.cycle_in(timed)).sum());
@@ -98,6 +147,7 @@ fn by_axes(criterion: &mut Criterion) {
                 "in motion all the time"
             );
         }
+        recording.into_iter().for_each(assert_complete);
     }
     group.finish();
 }

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use std::net::{Ipv4Addr, SocketAddrV4};
 
 use arrayvec::ArrayVec;
+use axisbridge::capture::recorder::Tap;
 use axisbridge::config::Config;
 use axisbridge::engine::build::{Built, Commissioners, build};
 use axisbridge::engine::notice::Notice;
@@ -334,6 +335,21 @@ impl Many {
             assert!(self.now.since(start) < limit, "{what} is not reached within {limit}\n{}", self.told());
             self.step();
         }
+    }
+
+    /// Records what goes through the ports of the SERCOS line and the devices, with a tap for each.
+    pub fn record(&mut self, taps: impl IntoIterator<Item = Tap>) {
+        let mut taps = taps.into_iter();
+        self.south.tap = taps.next();
+        for seat in &mut self.seats {
+            seat.north.tap = taps.next();
+        }
+    }
+
+    /// How many taps [`Many::record`] takes.
+    #[must_use]
+    pub fn taps(&self) -> usize {
+        1 + self.seats.len()
     }
 
     /// Runs the engine's next call by itself and hands it to `around`, which has to make it: for whoever wants to weigh it

@@ -1,11 +1,14 @@
 //! The engine's ports as queues. They own fixed storage: what the engine does in a cycle can be weighed
 //! without them.
 
-use std::net::SocketAddrV4;
+use std::net::{Ipv4Addr, SocketAddrV4};
 
+use axisbridge::capture::Side;
+use axisbridge::capture::recorder::Tap;
 use axisbridge::engine::port::{CanInput, CanPort, CanSent, Datagram, EthernetPort, FRAME_MAX, NorthPort};
 use axisbridge::simulate::can_bus::{CanNode, InProcessCan};
 use axisbridge::simulate::can_drive::DriveNode;
+use axisbridge::sys::clock::{KernelTime, realtime_now};
 use profile_generic::can::{Frame, Id};
 use profile_generic::time::MonotonicTime;
 use profile_sercos::checker::bus::Stations;
@@ -128,6 +131,9 @@ impl<T> Ring<T> {
     }
 }
 
+/// Where recorded datagrams of a device come from and go to.
+const RECORDED: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(10, 0, 2, 1), 2_222);
+
 /// The UDP port of a device.
 #[derive(Debug)]
 pub struct NorthQueue {
@@ -135,21 +141,29 @@ pub struct NorthQueue {
     pub inbound: Ring<(SocketAddrV4, MonotonicTime)>,
     /// What the device has sent, with its destination.
     pub outbound: Ring<SocketAddrV4>,
+    /// Records what goes to and fro, as the port of a gateway does.
+    pub tap: Option<Tap>,
 }
 
 impl Default for NorthQueue {
     fn default() -> Self {
-        Self { inbound: Ring::with_room(FLOOD), outbound: Ring::default() }
+        Self { inbound: Ring::with_room(FLOOD), outbound: Ring::default(), tap: None }
     }
 }
 
 impl NorthPort for NorthQueue {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<Datagram> {
         let (len, (from, arrived_at)) = self.inbound.pop_into(buffer)?;
+        if let Some(tap) = &mut self.tap {
+            tap.datagram(KernelTime(arrived_at.0), from, RECORDED, 0, &buffer[..len]);
+        }
         Some(Datagram { len, from, arrived_at: Some(arrived_at) })
     }
 
     fn send(&mut self, datagram: &[u8], to: SocketAddrV4) -> bool {
+        if let Some(tap) = &mut self.tap {
+            tap.datagram(realtime_now(), RECORDED, to, 0, datagram);
+        }
         self.outbound.push(datagram, to)
     }
 }
@@ -165,6 +179,8 @@ pub struct SouthQueue {
     pub sent_at: Option<MonotonicTime>,
     /// Frames are handed over with their instant, as to a port that holds them until then.
     pub holds: bool,
+    /// Records what goes to and fro, as the port of a gateway does.
+    pub tap: Option<Tap>,
 }
 
 impl SouthQueue {
@@ -200,11 +216,18 @@ impl SouthQueue {
 
 impl EthernetPort for SouthQueue {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
-        self.inbound.pop_into(buffer).map(|(len, ())| (Port::One, len))
+        let (len, ()) = self.inbound.pop_into(buffer)?;
+        if let Some(tap) = &mut self.tap {
+            tap.frame(KernelTime(0), Side::South(Port::One), &buffer[..len]);
+        }
+        Some((Port::One, len))
     }
 
     fn send(&mut self, at: MonotonicTime, port: Port, frame: &[u8]) -> bool {
         self.sent_at = Some(at);
+        if let Some(tap) = &mut self.tap {
+            tap.frame(realtime_now(), Side::South(port), frame);
+        }
         port == Port::One && self.outbound.push(frame, ())
     }
 

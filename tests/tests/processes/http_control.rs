@@ -28,7 +28,7 @@ fn certificate(name: &str) -> PathBuf {
 }
 
 /// Makes a token as a user does: the token, and the file with its hash.
-fn token(name: &str) -> (String, PathBuf) {
+pub fn token(name: &str) -> (String, PathBuf) {
     let file = path(&format!("{name}.token"));
     let output = Command::new(axisbridge())
         .args(["token", "--replace", "--output"])

@@ -18,9 +18,9 @@ const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// A package and what was in it.
-struct Package {
+pub struct Package {
     file: PathBuf,
-    tree: PathBuf,
+    pub tree: PathBuf,
 }
 
 /// Builds the package into this folder.
@@ -33,7 +33,7 @@ fn build(folder: &Path) -> PathBuf {
 }
 
 /// The package, built once for all tests; `None` where nothing can build it.
-fn package(test: &str) -> Option<&'static Package> {
+pub fn package(test: &str) -> Option<&'static Package> {
     static BUILT: OnceLock<Package> = OnceLock::new();
     if !peer::has_program("dpkg-deb") {
         peer::skip(test, "dpkg-deb");
@@ -81,7 +81,7 @@ fn exec_start(package: &Package, config: &Path, socket: &Path) -> Command {
 }
 
 /// A folder of this test whose path is short enough for a socket.
-fn short_folder(name: &str) -> PathBuf {
+pub fn short_folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("axb-{name}-{}", std::process::id()));
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).expect("a folder for sockets");
@@ -314,7 +314,7 @@ fn package_is_installed_upgraded_and_removed_and_leaves_what_was_edited() {
 }
 
 /// The shipped configuration as a person edits it, for a drive in the process.
-fn edited(address: &str) -> String {
+pub fn edited(address: &str) -> String {
     let shipped = include_str!("../../../packaging/gateway.toml");
     let text = shipped.replace("listen = \"CHANGE\"", &format!("listen = \"{address}\""));
     let text = text

@@ -11,7 +11,7 @@ use super::http::{address, get, until};
 use super::local::{Gateway, path};
 
 /// An axis on each kind of bus.
-const CONFIGURATION: &str = include_str!("page.toml");
+pub const CONFIGURATION: &str = include_str!("page.toml");
 
 const FAULT: &str = "excessive_position_error";
 

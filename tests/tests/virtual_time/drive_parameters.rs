@@ -168,7 +168,7 @@ fn the_elements_of_an_idn_are_shown_as_its_attribute_says() {
     let shown = bench.say("read turntable P-0-4000");
     let expected = "ok read turntable {\"id\":\"P-0-4000\",\"name\":\"Own gain\",\"type\":\"2 byte signed, 2 decimals\",\
                     \"unit\":\"A\",\"minimum\":\"-10.00\",\"maximum\":\"10.00\",\"attribute\":\"0x02210001\",\
-                    \"value\":\"-1.25\",\"data\":\"83ff\"}\n";
+                    \"writable\":\"without torque\",\"value\":\"-1.25\",\"data\":\"83ff\"}\n";
     assert_eq!(shown, expected);
     let brief = bench.object("read turntable P-0-4000 brief");
     assert_eq!((&brief["name"], &brief["value"]), (&"Own gain".into(), &"-1.25".into()));

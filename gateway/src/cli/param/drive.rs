@@ -1,12 +1,9 @@
 //! The drive of an axis: requests of the local socket, and what their replies mean. A gateway answers them, or the drive itself
 //! over its bus.
 
-use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-
-use serde::Serialize;
 
 use super::At;
 use super::alone::Alone;
@@ -15,6 +12,8 @@ pub use crate::cli::gateway_client::Reply;
 use crate::cli::{CliError, signal};
 use crate::local::drive::CommandReport;
 use crate::local::drive::job::{Act, Listing, ParameterReport};
+use crate::local::drive::reply::report;
+pub use crate::local::drive::reply::{List, Listed, Refused};
 use crate::parameter::id::Id;
 
 /// How long a drive may take for a request: several accesses, each of which the gateway gives up after a second or so.
@@ -59,72 +58,6 @@ pub enum Found<T = ParameterReport> {
     Report(Box<T>),
     /// The gateway or the drive refused.
     Refused(Refused),
-}
-
-/// Why something was refused.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refused {
-    /// The code of the reply.
-    pub code: String,
-    /// Its text.
-    pub text: String,
-}
-
-impl Refused {
-    /// Whether asking for other parameters makes no sense either.
-    pub fn ends_all(&self) -> bool {
-        ["unanswered", "ending", "no-axis", "controller", "held", "torque"].contains(&self.code.as_str())
-    }
-}
-
-impl fmt::Display for Refused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text)
-    }
-}
-
-/// The parameters that are known of a drive.
-#[derive(Debug, Serialize)]
-pub struct List {
-    /// The axis.
-    pub axis: String,
-    /// The kind of its bus.
-    pub bus: String,
-    /// Where the list is from.
-    pub source: String,
-    /// The parameters, in the order of the list.
-    pub parameters: Vec<Listed>,
-}
-
-/// A parameter of a list.
-#[derive(Debug, PartialEq, Eq, Serialize)]
-pub struct Listed {
-    /// Its number or name.
-    pub id: String,
-    /// What else is known of it: access, type, unit, limits.
-    #[serde(flatten)]
-    pub details: std::collections::BTreeMap<String, String>,
-}
-
-impl Listed {
-    /// Reads `parameter ID NAME=VALUE ... name=REST`.
-    fn parse(line: &str) -> Option<Self> {
-        let line = line.strip_prefix("parameter ")?;
-        let (words, name) = match line.split_once(" name=") {
-            Some((words, name)) => (words, Some(name)),
-            None => (line, None),
-        };
-        let mut words = words.split(' ');
-        let id = words.next().filter(|id| !id.is_empty())?.to_owned();
-        let pairs = words.filter_map(|word| word.split_once('='));
-        let pairs = pairs.chain(name.map(|name| ("name", name)));
-        Some(Self { id, details: pairs.map(|(key, value)| (key.to_owned(), value.to_owned())).collect() })
-    }
-
-    /// What is known under a key; empty when nothing is.
-    pub fn detail(&self, key: &str) -> &str {
-        self.details.get(key).map_or("", String::as_str)
-    }
 }
 
 impl Drive {
@@ -204,16 +137,8 @@ impl Drive {
             Listing::Commands => " commands",
         };
         let reply = self.link.ask(&format!("list {}{of}", self.axis))?;
-        let Some(words) = reply.last.strip_prefix(&format!("ok list {} ", self.axis)) else {
-            return Err(refused(&reply.last).text.into());
-        };
-        let find = |key: &str| words.split(' ').find_map(|word| word.strip_prefix(key)).unwrap_or_default();
-        Ok(List {
-            axis: self.axis.clone(),
-            bus: find("bus=").to_owned(),
-            source: find("source=").to_owned(),
-            parameters: reply.lines.iter().filter_map(|line| Listed::parse(line)).collect(),
-        })
+        let lines = reply.lines.iter().map(String::as_str);
+        List::parse(&self.axis, lines, &reply.last).map_err(|refused| refused.text.into())
     }
 
     /// A request for a parameter.
@@ -234,33 +159,12 @@ impl Drive {
     ) -> Result<Found<T>, CliError> {
         let reply = self.link.ask(&format!("{request} {} {rest}", self.axis))?.last;
         let Some(words) = reply.strip_prefix(&format!("ok {request} {} ", self.axis)) else {
-            return Ok(Found::Refused(refused(&reply)));
+            return Ok(Found::Refused(Refused::parse(&reply)));
         };
         read(words)
             .map(|report| Found::Report(Box::new(report)))
             .ok_or_else(|| format!("unexpected reply `{reply}`").into())
     }
-}
-
-/// The parameter of a reply: an object, or `NAME=VALUE unit=UNIT`.
-fn report(words: &str) -> Option<ParameterReport> {
-    if words.starts_with('{') {
-        return serde_json::from_str(words).ok();
-    }
-    let mut words = words.split(' ');
-    let (id, value) = words.next()?.split_once('=')?;
-    let unit = words.find_map(|word| word.strip_prefix("unit=")).map(str::to_owned);
-    Some(ParameterReport { id: id.to_owned(), value: value.to_owned(), unit, ..ParameterReport::default() })
-}
-
-/// Takes `error WORD AXIS CODE: TEXT` apart.
-fn refused(reply: &str) -> Refused {
-    let parts = reply.strip_prefix("error ").and_then(|rest| {
-        let (head, text) = rest.split_once(": ")?;
-        Some((head.rsplit(' ').next()?, text))
-    });
-    let (code, text) = parts.unwrap_or(("", reply));
-    Refused { code: code.to_owned(), text: text.to_owned() }
 }
 
 /// A parameter that can be a word of a request.
@@ -278,40 +182,4 @@ fn word(parameter: &str) -> Result<&str, CliError> {
 /// A whole number as the gateway shows it.
 fn whole(value: &str) -> Option<String> {
     value.parse::<i64>().ok().map(|value| value.to_string())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn replies_are_taken_apart() {
-        let refused = refused("error write turntable value: S-0-0100: the drive refuses: it");
-        assert_eq!(
-            (refused.code.as_str(), refused.text.as_str()),
-            ("value", "S-0-0100: the drive refuses: it")
-        );
-        assert_eq!(super::refused("what").text, "what");
-        let named = report("notch_frequency=120000 unit=mHz").unwrap();
-        assert_eq!((named.id.as_str(), named.value.as_str()), ("notch_frequency", "120000"));
-        assert_eq!(named.unit.as_deref(), Some("mHz"));
-        let object = report(r#"{"id":"6081:00","type":"u32","value":"5","data":"05000000"}"#).unwrap();
-        assert_eq!((object.kind.as_deref(), object.value.as_str()), (Some("u32"), "5"));
-        assert_eq!(report("{"), None);
-        assert_eq!(report("5"), None);
-    }
-
-    #[test]
-    fn lines_of_a_list_are_taken_apart() {
-        let listed =
-            Listed::parse("parameter 6081:00 access=rw type=u32 name=Profile velocity = max").unwrap();
-        assert_eq!(listed.id, "6081:00");
-        assert_eq!(
-            ["access", "type", "unit", "name"].map(|key| listed.detail(key)),
-            ["rw", "u32", "", "Profile velocity = max"]
-        );
-        assert_eq!(Listed::parse("parameter P-0-0001").unwrap().id, "P-0-0001");
-        assert_eq!(Listed::parse("parameter "), None);
-        assert_eq!(Listed::parse("axis x"), None);
-    }
 }

@@ -14,8 +14,20 @@ pub fn json(report: &ParameterReport) -> Result<String, CliError> {
 
 /// A parameter with everything that is known of it.
 pub fn parameter(report: &ParameterReport) -> String {
-    let ParameterReport { id, name, kind, unit, minimum, maximum, attribute, access, value, data, .. } =
-        report;
+    let ParameterReport {
+        id,
+        name,
+        kind,
+        unit,
+        minimum,
+        maximum,
+        attribute,
+        access,
+        writable,
+        value,
+        data,
+        ..
+    } = report;
     let mut text = id.clone();
     if let Some(name) = name {
         let _ = write!(text, " {}", printable(name));
@@ -32,6 +44,7 @@ pub fn parameter(report: &ParameterReport) -> String {
         ("type", kind.clone()),
         ("attribute", attribute.clone()),
         ("access", access.clone()),
+        ("writable", writable.clone()),
         ("data", Some(data.clone()).filter(|data| !data.is_empty())),
     ];
     for (key, value) in rows {
@@ -113,6 +126,7 @@ mod tests {
             maximum: text("655.35"),
             attribute: text("0x02110001"),
             access: None,
+            writable: text("without torque"),
             value: "1.50".to_owned(),
             before: text("1.00"),
             recommission: false,

@@ -62,13 +62,18 @@ pub(super) struct Around<'a> {
 }
 
 impl Member {
-    /// An axis as it is configured; `None` if its scaling cannot be expressed exactly.
-    pub fn new(config: MemberConfig, mapping: &Mapping) -> Option<Self> {
+    /// An axis as it is configured; `None` if its scaling cannot be expressed exactly. `others` are axes of the same mapping: what is alike is
+    /// in memory once.
+    pub fn new(config: MemberConfig, mapping: &Mapping, others: &[Self]) -> Option<Self> {
+        let alike = others.iter().map(|other| &other.scaling).find(|other| other.is_used(&config.scaling));
         Some(Self {
             axis: config.axis,
             cip: CipAxis::new(config.program),
             state: AxisState::Off,
-            scaling: Scaling::new(mapping, config.scaling, config.feedback)?,
+            scaling: match alike {
+                Some(alike) => alike.alike(config.feedback),
+                None => Scaling::new(mapping, config.scaling, config.feedback)?,
+            },
             stopping: Stopping::new(config.stops),
             accesses: Accesses::default(),
             node_fault: None,

@@ -113,13 +113,12 @@ impl DeviceChannel {
             .attribute_definitions(&axes[0].scaling)
             .ok_or(ChannelError::Scaling { axis: axes[0].axis })?;
         let device = MotionDevice::new(config)?;
-        let members = axes
-            .into_iter()
-            .map(|config| {
-                let axis = config.axis;
-                Member::new(config, mapping).ok_or(ChannelError::Scaling { axis })
-            })
-            .collect::<Result<_, ChannelError>>()?;
+        let mut members: Vec<Member> = Vec::with_capacity(axes.len());
+        for config in axes {
+            let axis = config.axis;
+            let member = Member::new(config, mapping, &members).ok_or(ChannelError::Scaling { axis })?;
+            members.push(member);
+        }
         Ok(Self {
             number,
             device,

@@ -58,6 +58,24 @@ impl Scaling {
         Some(Self { used: configured, configured, attributes, is_taken: false, by_device: true, feedback })
     }
 
+    /// Whether this scaling is in use.
+    pub fn is_used(&self, scaling: &CipScaling) -> bool {
+        self.used == *scaling
+    }
+
+    /// The scaling in use as the configuration of another axis, which shares the attributes.
+    pub fn alike(&self, feedback: FeedbackUse) -> Self {
+        let attributes = self.attributes.clone();
+        Self {
+            used: self.used,
+            configured: self.used,
+            attributes,
+            is_taken: false,
+            by_device: true,
+            feedback,
+        }
+    }
+
     /// The attributes in the scaling that is in use.
     pub fn attributes(&self) -> &AttributeTable {
         &self.attributes

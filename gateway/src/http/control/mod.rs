@@ -30,6 +30,7 @@ use self::beats::{Age, Beats};
 use super::access::Lease;
 use super::login::{Entered, bearer, refuse, unknown};
 use crate::engine::local::Order;
+use crate::local::drive::job::Ask;
 use crate::local::protocol::{BadRequest, LINE_MAX, Request};
 use crate::local::{Session, Taken, Who};
 
@@ -220,17 +221,23 @@ fn take(session: &mut Session, age: Age, line: &str) -> String {
         Request::Axes
         | Request::Status { .. }
         | Request::Order { order: Order::Stop | Order::Disable, .. } => {}
-        Request::Order { .. } if age == Age::Fresh => {}
-        Request::Order { .. } => {
+        Request::Drive { ask: Ask::List { .. } | Ask::Command { .. }, .. } => return not_here(word),
+        Request::Order { .. } | Request::Drive { .. } | Request::Parameter { .. } if age == Age::Fresh => {}
+        Request::Order { .. } | Request::Drive { .. } | Request::Parameter { .. } => {
             return format!(
                 "error {word} {axis} late: the request was on its way for too long, nothing was done\n"
             );
         }
-        _ => return format!("error {word} - not-here: `{word}` is a request for the Unix socket\n"),
+        _ => return not_here(word),
     }
     match session.begin_request(request, &line) {
         Taken::Reply(reply) => reply,
         // No request for a file comes here.
         Taken::Asked | Taken::File(_) => String::new(),
     }
+}
+
+/// The reply to what only the Unix socket has.
+fn not_here(word: &str) -> String {
+    format!("error {word} - not-here: `{word}` is a request for the Unix socket\n")
 }

@@ -4,6 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
+use profile_sercos::wire::attribute::{Attribute, Format, ItemLength};
 use serde_json::Value;
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::{Error, Message, WebSocket};
@@ -12,6 +13,7 @@ use super::super::access::{SECRET, Token, hash};
 use super::super::server::HttpServer;
 use super::super::tests::{Bench, PATIENCE};
 use super::super::tls;
+use crate::engine::direct::{DirectAnswer, DirectFailure, DirectRequest, Direction};
 use crate::engine::local::{Answer, Failure, Order, Request};
 use crate::local::Hub;
 use crate::local::server_tests::{queues, shared};
@@ -21,6 +23,7 @@ struct Site {
     bench: Bench,
     requests: rtrb::Consumer<Request>,
     answers: rtrb::Producer<Answer>,
+    direct: (rtrb::Consumer<DirectRequest>, rtrb::Producer<DirectAnswer>),
     /// Runs the hub.
     _runtime: tokio::runtime::Runtime,
 }
@@ -31,14 +34,14 @@ impl Site {
     }
 
     fn of(make: impl FnOnce(HttpServer) -> HttpServer) -> Self {
-        let (ends, (requests, answers), _) = queues();
+        let (ends, (requests, answers), direct) = queues();
         let (hub, door) = Hub::new(shared(), ends);
         let runtime =
             tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
         runtime.spawn(hub.run());
         let token = Token::parse(&hash(SECRET).unwrap()).unwrap();
         let bench = Bench::of(64, |server| make(server).control(token, door));
-        Self { bench, requests, answers, _runtime: runtime }
+        Self { bench, requests, answers, direct, _runtime: runtime }
     }
 
     /// The key of a new session.
@@ -84,6 +87,27 @@ impl Site {
             assert!(Instant::now() < end, "no request reaches the engine");
             std::thread::sleep(Duration::from_millis(1));
         }
+    }
+}
+
+impl Site {
+    /// The access that reaches the engine next; its answer is given at once.
+    fn answer_access(&mut self, result: Result<Option<Attribute>, DirectFailure>, bytes: &[u8]) -> Direction {
+        let end = Instant::now() + PATIENCE;
+        let DirectRequest { client, id, direction, mut data, .. } = loop {
+            if let Ok(request) = self.direct.0.pop() {
+                break request;
+            }
+            assert!(Instant::now() < end, "no access reaches the engine");
+            std::thread::sleep(Duration::from_millis(1));
+        };
+        if direction == Direction::Read {
+            data.extend_from_slice(bytes);
+        } else {
+            assert_eq!(data, bytes, "what is written");
+        }
+        self.direct.1.push(DirectAnswer { client, id, result, data }).unwrap();
+        direction
     }
 }
 
@@ -237,7 +261,8 @@ fn orders_reach_the_engine_and_jogs_are_short() {
     stream.say("axes");
     assert!(stream.hear().ends_with("\nok axes 2"));
     for (line, reply) in [
-        ("write x S-0-0104 1", "error write - not-here: `write` is a request for the Unix socket"),
+        ("list x", "error list - not-here: `list` is a request for the Unix socket"),
+        ("command x S-0-0264 start", "error command - not-here: `command` is a request for the Unix socket"),
         ("bundle", "error bundle - not-here: `bundle` is a request for the Unix socket"),
         ("enable z", "error enable - no-axis: unknown axis `z`: expected x, y"),
         ("enable\nx", "error - - syntax: the line is not printable UTF-8 text"),
@@ -405,4 +430,45 @@ fn encrypted(bench: &Bench, path: &str) -> String {
     // The server closes after one answer.
     let _ = stream.read_to_string(&mut text);
     text
+}
+
+#[test]
+fn parameter_is_written_by_a_fresh_request_and_read_back() {
+    let mut site = Site::new();
+    let mut stream = site.open(&site.log_in());
+    let gain = Some(Attribute::new(ItemLength::Two, Format::Unsigned).with_decimals(2));
+    stream.say("write x S-0-0104 2.5");
+    assert_eq!(site.answer_access(Ok(gain), &[100, 0]), Direction::Read);
+    assert_eq!(site.answer_access(Ok(None), &[250, 0]), Direction::Write { rescales: false });
+    assert_eq!(site.answer_access(Ok(gain), &[250, 0]), Direction::Read);
+    // The unit.
+    assert_eq!(site.answer_access(Ok(None), b"1/s"), Direction::Read);
+    let reply = stream.hear();
+    let report: Value = serde_json::from_str(reply.strip_prefix("ok write x ").expect(&reply)).unwrap();
+    assert_eq!((&report["value"], &report["before"]), (&"2.50".into(), &"1.00".into()));
+
+    // One that the drive has changed, and one that the engine refuses.
+    stream.say("write x S-0-0104 2.5");
+    site.answer_access(Ok(gain), &[100, 0]);
+    site.answer_access(Ok(None), &[250, 0]);
+    site.answer_access(Ok(gain), &[249, 0]);
+    let changed = "error write x not-kept: the drive took S-0-0104 = 2.50 and has 2.49 afterwards";
+    assert_eq!(stream.hear(), changed);
+    stream.say("write x S-0-0104 2.5");
+    site.answer_access(Ok(gain), &[100, 0]);
+    site.answer_access(Err(DirectFailure::Torque), &[250, 0]);
+    let torque = "error write x torque: S-0-0104: parameters are not written while the drive has torque";
+    assert_eq!(stream.hear(), torque);
+
+    // One that the network has kept.
+    let beat = stream.beat();
+    while stream.beat() < beat + 5 {
+        let beat = stream.beat;
+        stream.say_at(beat, "status x");
+        assert!(stream.hear().starts_with("ok status x "));
+    }
+    stream.say_at(beat, "write x S-0-0104 2.5");
+    let late = "error write x late: the request was on its way for too long, nothing was done";
+    assert_eq!(stream.hear(), late);
+    assert!(site.direct.0.is_empty(), "nothing of it reaches the engine");
 }

@@ -1,5 +1,5 @@
 
-// ---- an axis: state, faults, the last minute, limits ---------------------------------------------------------
+// ---- an axis: state, faults, the last minute, limits, parameters ----------------------------------------------
 
 const MINUTE = 60;
 const SAMPLE = 0.1;
@@ -44,6 +44,7 @@ function buildAxis(name) {
     sheet: null,
     seen: null,
   });
+  buildParameters(section(view, 'axis-parameters', 'Parameters of the drive', true), name);
   fetchOnce(`/api/v1/axis?axis=${name}`, (sheet) => {
     if (axisView.name !== name) return;
     axisView.sheet = sheet;
@@ -71,6 +72,7 @@ function showAxis({ status, history }, name) {
     [old ? 'last reported' : '', axis.node ? `node ${axis.node.state}` : ''].filter(Boolean).join(', '));
   showNotes(axisView.notes, axisNotes(axis));
   showControl(axis);
+  showParameters();
   showAxisValues(axis);
   showLimits(axis);
   if (axisView.seen !== history.faults) {

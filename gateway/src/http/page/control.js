@@ -221,6 +221,7 @@ function takeControl() {
     if (control.socket !== socket) return;
     control.socket = null;
     release();
+    loseWrite();
     if (opened) {
       say(`Control is lost: ${event.reason || 'the connection has ended'}. The axis stops and loses its torque.`, 'fault');
     } else {
@@ -240,6 +241,7 @@ function giveBack(text) {
   control.socket = null;
   control.state = '';
   socket.close();
+  loseWrite();
   say(text);
   showButtons();
 }
@@ -306,7 +308,9 @@ function hear(text) {
     return;
   }
   const [, verdict, word, axis, rest] = /^(ok|error) (\S+) (\S+) ?(.*)$/.exec(text) || [];
-  if (verdict === 'error') {
+  if (word === 'write') {
+    hearWrite(verdict, rest);
+  } else if (verdict === 'error') {
     const [, code, why] = /^(\S+): (.*)$/.exec(rest) || [null, '', rest];
     if (word === 'jog') release();
     // A stop or a move that gives way to what was asked after it.

@@ -1,5 +1,6 @@
 //! A request of a client for the drive of an axis: accesses one after the other, and the reply.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::command::CommandJob;
@@ -100,7 +101,7 @@ impl Ask {
 }
 
 /// A parameter as its drive has it: the object in replies.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ParameterReport {
     /// Its number.
     pub id: String,
@@ -125,6 +126,9 @@ pub struct ParameterReport {
     /// What can be done with an object, as far as anybody says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub access: Option<String>,
+    /// When it can be written while the gateway runs: `without torque`, or why not; not there when nobody says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub writable: Option<String>,
     /// The value.
     pub value: String,
     /// What it was before a write.
@@ -170,6 +174,15 @@ pub enum Job {
 }
 
 impl Job {
+    /// The parameter that is written, if it is that.
+    #[must_use]
+    pub const fn written(&self) -> Option<Id> {
+        match self {
+            Self::Parameter(job) => job.written(),
+            Self::Command(_) => None,
+        }
+    }
+
     /// Begins with a request: the job and its first access.
     ///
     /// # Errors

@@ -3,5 +3,6 @@
 mod command;
 pub mod job;
 mod parameter;
+pub mod reply;
 
 pub use self::command::{CommandReport, State};

@@ -16,6 +16,7 @@ use super::job::{Ask, Context, Listing, ParameterReport, Step, error, is_over, r
 use crate::config::KnownObject;
 use crate::engine::direct::{DirectAnswer, DirectFailure, Direction, Target};
 use crate::local::protocol::parameter_lines;
+use crate::mapping::{Access, Cia402Access};
 use crate::parameter::attributes::KnownAttribute;
 use crate::parameter::command;
 use crate::parameter::id::Id;
@@ -71,6 +72,14 @@ impl ParameterJob {
             ..ParameterReport::default()
         };
         Ok((Self { ask, asked, attribute: None, report, wanted: Vec::new() }, step))
+    }
+
+    /// The parameter that is written, if it is that.
+    pub(super) const fn written(&self) -> Option<Id> {
+        match self.ask {
+            Ask::Write { id, .. } => Some(id),
+            _ => None,
+        }
     }
 
     /// Takes the answer of the drive.
@@ -165,6 +174,7 @@ impl ParameterJob {
         report.data = hex(data);
         report.kind = Some(kind.describe()).filter(|kind| !kind.is_empty());
         report.attribute = attribute.map(|attribute| format!("{:#010x}", attribute.0));
+        report.writable = ask.id().and_then(|id| writable(id, attribute, context));
         match ask.id() {
             Some(Id::Idn(idn)) => {
                 report.name =
@@ -260,6 +270,39 @@ impl ParameterJob {
         };
         error(&self.ask, context, failure.code(), &text)
     }
+}
+
+/// When a parameter can be written while the gateway runs, as far as tables and drive say. All drives are in CP4 then.
+fn writable(id: Id, attribute: Option<Attribute>, context: &Context<'_>) -> Option<String> {
+    const YES: &str = "without torque";
+    const NEVER: &str = "never";
+    if let Some(why) = belongs_to_gateway(id) {
+        return Some(format!("not through the gateway: {why}"));
+    }
+    let text = match id {
+        Id::Idn(_) => {
+            let attribute = attribute?;
+            let phases = [2, 3].map(|phase| !attribute.write_protected(phase));
+            match (attribute.write_protected(4), phases) {
+                _ if attribute.is_command() => "not: it is a procedure command",
+                (false, _) => YES,
+                (true, [true, true]) => "in CP2 and CP3 only",
+                (true, [true, false]) => "in CP2 only",
+                (true, [false, true]) => "in CP3 only",
+                (true, [false, false]) => NEVER,
+            }
+        }
+        Id::Object(object) => match context.bus.object(object)?.access? {
+            Cia402Access::Rw | Cia402Access::Wo => YES,
+            _ => NEVER,
+        },
+        Id::Path { .. } => match context.bus.attribute(id)?.access {
+            Access::Set => YES,
+            // The connection writes it.
+            Access::Get | Access::SetCyclic => NEVER,
+        },
+    };
+    Some(text.to_owned())
 }
 
 /// Name and unit of an IDN.
@@ -435,7 +478,7 @@ mod tests {
         let elements = [Element::Data, Element::Name, Element::Unit, Element::Minimum, Element::Maximum];
         assert_eq!(targets, elements.map(|element| Target::Element(Idn::standard(104), element)));
         let expected = "ok read x {\"id\":\"S-0-0104\",\"name\":\"Position loop K_V-factor\",\"type\":\"2 byte unsigned, 2 \
-                        decimals\",\"minimum\":\"0.01\",\"attribute\":\"0x02110001\",\"value\":\"1.50\",\"data\":\"9600\"}\n";
+                        decimals\",\"minimum\":\"0.01\",\"attribute\":\"0x02110001\",\"writable\":\"without torque\",\"value\":\"1.50\",\"data\":\"9600\"}\n";
         assert_eq!(reply, expected, "the name of the tables");
         let answers = vec![(Ok(Some(gain())), vec![0x96, 0]), (Err(DirectFailure::Unanswered), vec![])];
         let (_, reply) = steps(Ask::Read { id: id(), brief: false }, answers);
