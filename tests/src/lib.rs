@@ -10,6 +10,7 @@ pub mod can_led;
 pub mod expected;
 pub mod fuzz;
 pub mod host;
+pub mod mapping;
 pub mod modbus;
 pub mod namespace;
 pub mod peer;

@@ -1,9 +1,15 @@
+use profile_generic::fault::FaultCause;
+use profile_generic::image::Signal;
 use profile_generic::image::{AxisCommand, AxisFeedback};
 use profile_generic::program::ConversionReport;
 use profile_generic::quantity::{Position, Velocity};
+use profile_generic::ratio::Ratio;
 use profile_generic::scaling::{NANO, UnitKind};
+use profile_generic::state::Report;
 
 use super::*;
+use crate::cip_scaling::CipScaling;
+use crate::item::Item;
 
 fn mapping() -> Mapping {
     Mapping::embedded().expect("the shipped tables are sound")

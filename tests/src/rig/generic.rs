@@ -35,7 +35,8 @@ use profile_sercos::slave::drive::Drive;
 use profile_sercos::wire::idn::Idn;
 
 use super::ports::SouthQueue;
-use super::{BOX, HOST, START, SYSTEM_OFFSET, mapping};
+use super::{BOX, HOST, START, SYSTEM_OFFSET};
+use crate::mapping;
 
 /// SERCOS address of the drive.
 const ADDRESS: u16 = 1;
@@ -203,7 +204,7 @@ impl GenericRig {
         let mut line = drives([(ADDRESS, UnitKind::Rotary)], false);
         prepare(&mut needs, &mut line);
         // No drive comes later.
-        let (_, commissioner) = sercos::commissioner::commissioner(mapping(), 0, []);
+        let (_, commissioner) = sercos::commissioner::commissioner(mapping::shipped(), 0, []);
         let drive = DriveSetup { axis: 0, address: ADDRESS, needs, startup: Vec::new() };
         let bus =
             SercosBus::new(master, vec![drive], commissioner).expect("the master's configuration is sound");
@@ -246,13 +247,14 @@ impl GenericCan {
     ) -> Self {
         let text = CAN_BOX.replace("axis = 0", &format!("axis = {axis}"));
         let config = Config::parse(&text, "generic-can.toml").expect("the configuration is sound");
-        let Network { master, mut devices, .. } = network(&config, 0, &mapping()).expect("a network");
+        let Network { master, mut devices, .. } =
+            network(&config, 0, &mapping::shipped()).expect("a network");
         let mut bus = InProcessCan::of(&config.can[0], None);
         let needs = &mut devices[0].1[0].needs;
         needs.modes = modes.into_iter().collect();
         prepare(needs, bus.nodes_mut().next().expect("a device"));
         let (commissioner, end) =
-            can::commissioner::commissioner(mapping(), master.clone(), devices.iter().cloned());
+            can::commissioner::commissioner(mapping::shipped(), master.clone(), devices.iter().cloned());
         let master = CanBus::new(0, master, &devices, &[], end).expect("the master's configuration is sound");
         let south = CanSouth { bus, commissioner, axis, connected: true };
         Self::on(AnyBus::Can(Box::new(master)), south, limits)
@@ -291,7 +293,7 @@ impl GenericCan {
 impl<S: South> OneAxis<S> {
     /// The axis on its bus, once its drive is ready.
     fn on(bus: AnyBus, south: S, limits: Limits) -> Self {
-        let mapping = mapping();
+        let mapping = mapping::shipped();
         let mut axis = AxisChannel::new(limits, Reaction::DecelerateAndDisable, true);
         // A million counts to a revolution.
         axis.set_count(1_000);

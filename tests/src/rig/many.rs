@@ -34,6 +34,7 @@ use profile_sercos::checker::checked_bus::CheckedBus;
 use super::network::{Knobs, Pipe};
 use super::ports::{Bytes, CanWire, NorthQueue, SouthQueue};
 use super::{CONTROLLER_PORT, HOST, START, STEP_MAX, SYSTEM_OFFSET, ports_of};
+use crate::mapping;
 
 /// How many drives each bus has; every one is a turntable with an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -193,7 +194,7 @@ impl Many {
     pub fn ready(crowd: Crowd) -> Self {
         let config = Config::parse(&crowd.configuration(), "crowd.toml")
             .unwrap_or_else(|error| panic!("the configuration is sound: {error}"));
-        let mapping = Mapping::embedded().expect("the shipped tables are sound");
+        let mapping = mapping::shipped();
         let Built { mut engine, adapters, notices, status, commissioners } =
             build(&config, mapping.clone(), HOST).expect("the configuration makes a box");
         engine.set_sync(SyncState { grandmaster: Some(setup::HOST_CLOCK), synchronized: true, offset: 0 });

@@ -37,9 +37,8 @@ use axisbridge::engine::notice::Notice;
 use axisbridge::engine::phase_lock::LockState;
 use axisbridge::engine::port::SouthPort;
 use axisbridge::engine::{BUSES_MAX, Engine};
-use axisbridge::finding::Findings;
 use axisbridge::latest::Reader;
-use axisbridge::mapping::{Mapping, Overlay, TableTexts};
+use axisbridge::mapping::Mapping;
 use axisbridge::north::AdapterEnd;
 use axisbridge::simulate::can_bus::InProcessCan;
 use axisbridge::simulate::devicenet_drive::DevicenetNode;
@@ -73,6 +72,7 @@ use self::motion_checker::MotionChecker;
 use self::network::{Knobs, Pipe};
 use self::ports::{Bytes, CanWire, NorthQueue, SouthQueue};
 use self::wake_ups::WakeUps;
+use crate::mapping;
 
 /// The configuration of the box: a turntable (axis 1, revolutions) and a slide (axis 2, millimetres).
 pub const BOX: &str = include_str!("box.toml");
@@ -106,21 +106,6 @@ pub const GRID: DurationNs = DurationNs::from_millis(8);
 
 /// The updates of a controller that connects so long behind an instant of the grid come on it: it has some steps to go before.
 const FIRST_TO_GRID: DurationNs = DurationNs::from_millis(3);
-
-/// The two tables that everybody needs are compiled once in a process.
-fn mapping() -> Mapping {
-    mapping_with(&[])
-}
-
-/// The shipped tables with overlays.
-fn mapping_with(overlays: &[&str]) -> Mapping {
-    let mut texts = TableTexts::embedded();
-    texts.overlays = overlays.iter().map(|text| Overlay::new("own.toml", text)).collect();
-    let mut findings = Findings::default();
-    let mapping = Mapping::resolve(&texts, &mut findings);
-    assert!(!findings.has_errors(), "{findings}");
-    mapping.expect("the tables are sound")
-}
 
 /// How a rig is set up.
 #[derive(Debug, Clone)]
@@ -298,7 +283,7 @@ impl Rig {
             stream_works: true,
             command_port: IO_PORT,
             accepts_streams: true,
-            mapping: mapping_with(&settings.overlays),
+            mapping: mapping::with_overlays(&settings.overlays),
             overlays: settings.overlays,
             config,
             seed: settings.seed,
@@ -1013,7 +998,7 @@ type Assembled = (Engine, Adapter, AdapterEnd, rtrb::Consumer<Notice>, Reader<Bo
 
 fn assemble(config: &Config, overlays: &[&str]) -> Assembled {
     let Built { mut engine, adapters, notices, status, commissioners } =
-        build(config, mapping_with(overlays), HOST).expect("the configuration makes a box");
+        build(config, mapping::with_overlays(overlays), HOST).expect("the configuration makes a box");
     engine.set_sync(SyncState { grandmaster: Some(setup::HOST_CLOCK), synchronized: true, offset: 0 });
     let (config, link) = adapters.into_iter().next().expect("one device");
     let adapter = Adapter::new(config).expect("the adapter's configuration is sound");

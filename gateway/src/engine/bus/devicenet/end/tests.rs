@@ -1,9 +1,14 @@
+use profile_cip::devicenet::wire::speed::Assembly;
 use profile_cip::wire::Writer;
-use profile_cip::wire::motion::codes::{ActualDataSet, AxisStateCode, NodeControl};
+use profile_cip::wire::motion::codes::{
+    ActualDataSet, AxisControl, AxisStateCode, ControlMode, NodeControl, NodeStatus,
+};
 use profile_cip::wire::motion::fixed::{FixedActual, FixedCommand};
 use profile_cip::wire::motion::{ActualPosition, ActualValues, CommandPosition};
+use profile_generic::time::DurationNs;
 
 use super::*;
+use crate::mapping::devicenet::{MODE_AT, POSITION_AT, TORQUE_AT, VELOCITY_AT, motion};
 
 const CYCLE: DurationNs = DurationNs::from_millis(10);
 

@@ -5,19 +5,16 @@
 //! | its limits, as the configuration has them | SpeedScale: it has to be the one of the configuration |
 //! | Configuration Complete (attribute 89) | control and reference from the network, where its assembly has no bits for them |
 
+mod speed;
+
 use profile_cip::device::attribute::id;
 use profile_cip::devicenet::master::event::{ExplicitRequest, Outcome};
 
-use super::access::{read, value, write, written};
+pub use self::speed::speed_steps;
+use super::access::{value, write, written};
 use crate::engine::access::{AccessFailure, Refusal};
 use crate::mapping::Attribute;
-use crate::mapping::devicenet::{motion, speed};
-
-/// `NetCtrl` of the Control Supervisor.
-const NET_CONTROL: u16 = 5;
-
-/// `NetRef` of the AC/DC Drive object.
-const NET_REFERENCE: u16 = 4;
+use crate::mapping::devicenet::motion;
 
 /// One explicit message before operation, and the answer that it must have.
 #[derive(Debug, Clone)]
@@ -88,20 +85,6 @@ fn set(class: u16, id: u16, bytes: &[u8]) -> Option<SetupStep> {
 pub fn motion_steps(limits: &[(u16, f32)]) -> Vec<SetupStep> {
     let limits = limits.iter().filter_map(|(id, value)| set(motion::CLASS, *id, &value.to_le_bytes()));
     limits.chain(set(motion::CLASS, id::CONTROL_STATUS, &[1])).collect()
-}
-
-/// The steps of a velocity drive with this SpeedScale; `extended` is whether its output assembly has bits for control and
-/// reference from the network.
-#[must_use]
-pub fn speed_steps(scale: i8, extended: bool) -> Vec<SetupStep> {
-    let attribute = Attribute { class: speed::CLASS_DRIVE, id: speed::SPEED_SCALE };
-    let ask = read(attribute).map(|request| SetupStep { attribute, request, answer: Answer::Equals(scale) });
-    let mut steps: Vec<_> = ask.into_iter().collect();
-    if !extended {
-        steps.extend(set(speed::CLASS_SUPERVISOR, NET_CONTROL, &[1]));
-        steps.extend(set(speed::CLASS_DRIVE, NET_REFERENCE, &[1]));
-    }
-    steps
 }
 
 impl SetupStep {

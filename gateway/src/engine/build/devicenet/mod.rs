@@ -1,25 +1,21 @@
 //! The DeviceNet networks of a configuration.
 
+mod motion;
+mod speed;
+
 use std::sync::Arc;
 
 use profile_cip::device::config::DEVICE_TYPE_CIP_MOTION_DRIVE;
 use profile_cip::devicenet::master::config::{ExpectedIdentity, MasterConfig, SlaveConfig};
-use profile_cip::wire::motion::codes::ControlMode;
-use profile_generic::mode::OperatingMode;
-use profile_generic::ratio::Ratio;
-use profile_generic::scaling::{NANO, UnitKind};
 
-use super::{BuildError, axis_data, kind, parameters, startup};
-use crate::config::{Axis, AxisFunction, Config, Devicenet, DevicenetDrive, DevicenetKind, DriveAt};
+use super::{BuildError, axis_data, startup};
+use crate::config::{Axis, Config, Devicenet, DevicenetDrive, DevicenetKind, DriveAt};
 use crate::engine::bus::devicenet::commissioner::{Commissioner, commissioner};
-use crate::engine::bus::devicenet::end::{End, MotionLink, SpeedLink};
-use crate::engine::bus::devicenet::setup::{SetupStep, motion_steps, speed_steps};
+use crate::engine::bus::devicenet::end::End;
+use crate::engine::bus::devicenet::setup::SetupStep;
 use crate::engine::bus::devicenet::{DevicenetBus, DrivePlan};
-use crate::mapping::devicenet::{DevicenetAxis, DevicenetError, MotionAxis, SpeedAxis};
-use crate::mapping::{CipScaling, DriveProgram, Mapping};
-
-/// Highest SpeedScale and, with a minus, the lowest one that a ratio has room for.
-const SCALE_MAX: u32 = 30;
+use crate::mapping::devicenet::{DevicenetAxis, DevicenetError};
+use crate::mapping::{DriveProgram, Mapping};
 
 /// The master of a network without slaves.
 fn without_slaves(config: &Config, network: &Devicenet) -> MasterConfig {
@@ -149,70 +145,8 @@ pub fn parts(
 ) -> Result<Parts, DevicenetError> {
     match &drive.kind {
         DevicenetKind::Motion { modes, resolution } => {
-            let modes: &[OperatingMode] = match axis.function {
-                AxisFunction::Drive => modes,
-                // What is only looked at has its position looked at.
-                AxisFunction::Encoder | AxisFunction::Converter => &[OperatingMode::Position],
-            };
-            let scaling = scaling(drive, axis, *resolution)?;
-            let needs = MotionAxis { scaling, modes: modes.to_vec() };
-            let program = mapping.devicenet_motion_program(&needs)?;
-            let limits = parameters(axis);
-            let limits = limits
-                .into_iter()
-                .map(|(parameter, value)| mapping.devicenet_parameter(&scaling, parameter, value))
-                .collect::<Result<Vec<_>, _>>()?;
-            let first = match modes.first() {
-                Some(OperatingMode::Velocity) => ControlMode::VELOCITY,
-                Some(OperatingMode::Torque) => ControlMode::TORQUE,
-                _ => ControlMode::POSITION,
-            };
-            let link = MotionLink::new(first, *resolution, network.cycle_time);
-            let (end, needs) = (End::Motion(link), DevicenetAxis::Motion(needs));
-            Ok(Parts { end, needs, program, steps: motion_steps(&limits) })
+            motion::parts(network, drive, axis, mapping, (modes.as_slice(), *resolution))
         }
-        DevicenetKind::Speed { assembly, scale } => {
-            let speed = speed(drive, axis, *scale).ok_or(DevicenetError::Overflow)?;
-            let extended = assembly.is_extended();
-            let needs = SpeedAxis { speed, extended };
-            let program = mapping.devicenet_speed_program(&needs)?;
-            let link = SpeedLink::new(*assembly).map_err(|_| DevicenetError::Assembly(*assembly))?;
-            let (end, needs) = (End::Speed(link), DevicenetAxis::Speed(needs));
-            Ok(Parts { end, needs, program, steps: speed_steps(*scale, extended) })
-        }
-    }
-}
-
-/// The units of a CIP Motion drive: revolutions of its motor, or millimetres.
-fn scaling(drive: &DevicenetDrive, axis: &Axis, resolution: u32) -> Result<CipScaling, DevicenetError> {
-    // Nanounits of the axis in a turn; a way that is no whole number of them cannot be.
-    let way = match drive.way_of_a_turn {
-        Some(way) if kind(axis) == UnitKind::Linear => {
-            let whole = way.convert(NANO, profile_generic::ratio::Rounding::Nearest);
-            if whole.inexact || whole.saturated {
-                return Err(DevicenetError::Overflow);
-            }
-            whole.value
-        }
-        _ => NANO,
-    };
-    Ok(CipScaling {
-        kind: kind(axis),
-        nanounits_per_unit: way,
-        counts_per_unit: i64::from(resolution),
-        inverted: false,
-        unwind: None,
-    })
-}
-
-/// Nanounits of the axis per second in a unit of the speed: rpm / 2^SpeedScale.
-fn speed(drive: &DevicenetDrive, axis: &Axis, scale: i8) -> Option<Ratio> {
-    let steps = u32::from(scale.unsigned_abs()).min(SCALE_MAX);
-    let power = 1_i64 << steps;
-    let rpm = Ratio::new(NANO, 60)?;
-    let unit = rpm.then(if scale < 0 { Ratio::new(power, 1)? } else { Ratio::new(1, power)? })?;
-    match kind(axis) {
-        UnitKind::Rotary => Some(unit),
-        UnitKind::Linear => unit.then(drive.way_of_a_turn?),
+        DevicenetKind::Speed { assembly, scale } => speed::parts(drive, axis, mapping, (*assembly, *scale)),
     }
 }
