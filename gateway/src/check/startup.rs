@@ -5,8 +5,8 @@ use std::ops::Range;
 use profile_sercos::wire::attribute::{Attribute, ItemLength};
 use profile_sercos::wire::idn::Idn;
 
-use crate::config::Written;
 use crate::config::file::{CanDriveTable, DevicenetDriveTable, DriveTable};
+use crate::config::{Axis, Written};
 use crate::engine::build::startup::Reserved;
 use crate::engine::build::{can, devicenet, sercos};
 use crate::finding::registry as code;
@@ -23,60 +23,65 @@ const NAMED_MAX: usize = 8;
 
 /// Looks at the list of the drive of each axis.
 pub(super) fn check(mapping: &Mapping, written: &Written, findings: &mut Findings) {
-    let south = written.file.south.get_ref();
     let mut list = List { text: &written.text, findings };
     for axis in &written.config.axes {
-        if let Some(drive) = written.config.sercos_drive(axis).filter(|drive| !drive.startup.is_empty()) {
-            let reserved = Reserved::of_sercos(mapping, &sercos::needs(axis, drive));
-            let mut tables = south.sercos.iter().flat_map(|table| &table.get_ref().drive);
-            let named = |table: &&Spanned<DriveTable>| is_named(&table.get_ref().name, &drive.name);
-            let Some(table) = tables.find(named) else { continue };
-            let table = table.get_ref();
-            list.file(&drive.startup, table.startup_file.as_ref(), &reserved);
-            for (entry, table) in own(&drive.startup, &table.startup, |table| &table.parameter) {
-                if list.is_free(entry, table.parameter.span(), &reserved) {
-                    list.idn(entry, table.parameter.span(), table.value.span(), mapping);
-                }
-            }
+        sercos_drive(&mut list, axis, written, mapping);
+        can_drive(&mut list, axis, written, mapping);
+        devicenet_drive(&mut list, axis, written, mapping);
+    }
+}
+
+fn sercos_drive(list: &mut List<'_>, axis: &Axis, written: &Written, mapping: &Mapping) {
+    let drive = written.config.sercos_drive(axis).filter(|drive| !drive.startup.is_empty());
+    let Some(drive) = drive else { return };
+    let reserved = Reserved::of_sercos(mapping, &sercos::needs(axis, drive));
+    let mut tables = written.file.south.get_ref().sercos.iter().flat_map(|table| &table.get_ref().drive);
+    let named = |table: &&Spanned<DriveTable>| is_named(&table.get_ref().name, &drive.name);
+    let Some(table) = tables.find(named) else { return };
+    let table = table.get_ref();
+    list.file(&drive.startup, table.startup_file.as_ref(), &reserved);
+    for (entry, table) in own(&drive.startup, &table.startup, |table| &table.parameter) {
+        if list.is_free(entry, table.parameter.span(), &reserved) {
+            list.idn(entry, table.parameter.span(), table.value.span(), mapping);
         }
-        if let Some((bus, drive)) =
-            written.config.can_drive(axis).filter(|(_, drive)| !drive.startup.is_empty())
-        {
-            let reserved = Reserved::of_can(mapping, &can::needs(axis, bus, drive));
-            let mut tables = south.can.iter().flat_map(|table| &table.get_ref().drive);
-            let named = |table: &&Spanned<CanDriveTable>| is_named(&table.get_ref().name, &drive.name);
-            let Some(table) = tables.find(named) else { continue };
-            let table = table.get_ref();
-            list.file(&drive.startup, table.startup_file.as_ref(), &reserved);
-            let (_, known) = objects(bus, drive, mapping);
-            for (entry, table) in own(&drive.startup, &table.startup, |table| &table.parameter) {
-                let Id::Object(object) = entry.id else { continue };
-                let known =
-                    known.iter().find(|known| known.object == object).and_then(|known| known.data_type);
-                if list.is_free(entry, table.parameter.span(), &reserved) {
-                    list.object(entry, table.parameter.span(), table.value.span(), known);
-                }
-            }
+    }
+}
+
+fn can_drive(list: &mut List<'_>, axis: &Axis, written: &Written, mapping: &Mapping) {
+    let drive = written.config.can_drive(axis).filter(|(_, drive)| !drive.startup.is_empty());
+    let Some((bus, drive)) = drive else { return };
+    let reserved = Reserved::of_can(mapping, &can::needs(axis, bus, drive));
+    let mut tables = written.file.south.get_ref().can.iter().flat_map(|table| &table.get_ref().drive);
+    let named = |table: &&Spanned<CanDriveTable>| is_named(&table.get_ref().name, &drive.name);
+    let Some(table) = tables.find(named) else { return };
+    let table = table.get_ref();
+    list.file(&drive.startup, table.startup_file.as_ref(), &reserved);
+    let (_, known) = objects(bus, drive, mapping);
+    for (entry, table) in own(&drive.startup, &table.startup, |table| &table.parameter) {
+        let Id::Object(object) = entry.id else { continue };
+        let known = known.iter().find(|known| known.object == object).and_then(|known| known.data_type);
+        if list.is_free(entry, table.parameter.span(), &reserved) {
+            list.object(entry, table.parameter.span(), table.value.span(), known);
         }
-        if let Some((network, drive)) =
-            written.config.devicenet_drive(axis).filter(|(_, drive)| !drive.startup.is_empty())
-        {
-            // Why there are none is found elsewhere.
-            let Ok(parts) = devicenet::parts(network, drive, axis, mapping) else { continue };
-            let reserved = Reserved::of_devicenet(&parts.steps);
-            let mut tables = south.devicenet.iter().flat_map(|table| &table.get_ref().drive);
-            let named = |table: &&Spanned<DevicenetDriveTable>| is_named(&table.get_ref().name, &drive.name);
-            let Some(table) = tables.find(named) else { continue };
-            let table = table.get_ref();
-            list.file(&drive.startup, table.startup_file.as_ref(), &reserved);
-            let known = attributes(&drive.kind, mapping);
-            for (entry, table) in own(&drive.startup, &table.startup, |table| &table.parameter) {
-                let known =
-                    known.iter().find(|known| known.id == entry.id).and_then(|known| known.data_type());
-                if list.is_free(entry, table.parameter.span(), &reserved) {
-                    list.object(entry, table.parameter.span(), table.value.span(), known);
-                }
-            }
+    }
+}
+
+fn devicenet_drive(list: &mut List<'_>, axis: &Axis, written: &Written, mapping: &Mapping) {
+    let drive = written.config.devicenet_drive(axis).filter(|(_, drive)| !drive.startup.is_empty());
+    let Some((network, drive)) = drive else { return };
+    // Why there are none is found elsewhere.
+    let Ok(parts) = devicenet::parts(network, drive, axis, mapping) else { return };
+    let reserved = Reserved::of_devicenet(&parts.steps);
+    let mut tables = written.file.south.get_ref().devicenet.iter().flat_map(|table| &table.get_ref().drive);
+    let named = |table: &&Spanned<DevicenetDriveTable>| is_named(&table.get_ref().name, &drive.name);
+    let Some(table) = tables.find(named) else { return };
+    let table = table.get_ref();
+    list.file(&drive.startup, table.startup_file.as_ref(), &reserved);
+    let known = attributes(&drive.kind, mapping);
+    for (entry, table) in own(&drive.startup, &table.startup, |table| &table.parameter) {
+        let known = known.iter().find(|known| known.id == entry.id).and_then(|known| known.data_type());
+        if list.is_free(entry, table.parameter.span(), &reserved) {
+            list.object(entry, table.parameter.span(), table.value.span(), known);
         }
     }
 }

@@ -127,6 +127,34 @@ fn run_once(
         files: Some(&good.files),
     };
     let running = runner::start(&good.config, good.mapping.clone(), extras, settings)?;
+    let (next, reloads) = attend(&running, arguments, asked, manager)?;
+    let stops = asked.stop.load(Ordering::Relaxed);
+    info!(
+        "axisbridge stops: the axes stop, then the bus goes down; a second signal ends the wait for the axes"
+    );
+    if stops {
+        manager.borrow_mut().stopping();
+    }
+    let rested = stop(running, asked, manager)?;
+    if stops {
+        return Ok(After::End { rested });
+    }
+    let why = if reloads {
+        "configuration and tables were read again"
+    } else {
+        "a controller has reset the Identity object"
+    };
+    info!(why, "axisbridge restarts");
+    Ok(After::Again(next))
+}
+
+/// Stays with a running gateway until it is to stop or to start again; the files that were read again, and whether they are why.
+fn attend(
+    running: &runner::RunningBox,
+    arguments: &RunArguments,
+    asked: &Asked,
+    manager: &RefCell<ServiceManager>,
+) -> Result<(Option<Box<Good>>, bool), CliError> {
     let mut told = false;
     let mut next = None;
     let mut reloads = false;
@@ -151,13 +179,15 @@ fn run_once(
             }
         }
     }
-    let stops = asked.stop.load(Ordering::Relaxed);
-    info!(
-        "axisbridge stops: the axes stop, then the bus goes down; a second signal ends the wait for the axes"
-    );
-    if stops {
-        manager.borrow_mut().stopping();
-    }
+    Ok((next, reloads))
+}
+
+/// Stops a gateway, and logs what is missing; whether every axis stands.
+fn stop(
+    running: runner::RunningBox,
+    asked: &Asked,
+    manager: &RefCell<ServiceManager>,
+) -> Result<bool, CliError> {
     let status = running.reader();
     // The wait for the axes can be longer than a watchdog is patient.
     let stopped = running.stop(&|| {
@@ -168,16 +198,7 @@ fn run_once(
         warn!(dropped, "frames are missing in the recording");
     }
     stopped.unrested.iter().for_each(|axis| error!("{axis}"));
-    if stops {
-        return Ok(After::End { rested: stopped.unrested.is_empty() });
-    }
-    let why = if reloads {
-        "configuration and tables were read again"
-    } else {
-        "a controller has reset the Identity object"
-    };
-    info!(why, "axisbridge restarts");
-    Ok(After::Again(next))
+    Ok(stopped.unrested.is_empty())
 }
 
 /// Reads the files again; `None` when they are refused.

@@ -8,45 +8,40 @@
 
 mod can_watch;
 mod cycle;
+mod devices;
 mod indicators;
 pub mod port;
 mod scribe;
+mod south;
 mod strangers;
 
-use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io;
-use std::net::{SocketAddr, SocketAddrV4};
+use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime as WallClock};
 
-use profile_cip::device::adapter::Adapter;
 use profile_cip::device::config::{AdapterConfig, QosConfig};
-use profile_cip::device::event::Event;
-use profile_cip::device::identity::{Health, ModuleState};
-use profile_cip::wire::motion::codes::AxisStateCode;
-use profile_generic::can::timing::BitRate;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 use tracing::{info, warn};
 
-use self::can_watch::CanWatch;
 use self::cycle::{CycleThread, Ended, Setup};
+use self::devices::{DeviceParts, ServerParts};
 use self::indicators::{Change, Shown};
-use self::port::{CanSocketPort, OpenPort, PacketPort, PortError, UdpPort};
+use self::port::{PacketPort, PortError};
 use self::scribe::Scribe;
-use self::strangers::DropWatch;
+pub(crate) use self::south::can_port;
 use crate::bundle::{Files, Sources};
 use crate::capture::can_bus::CanProtocol;
 use crate::capture::recorder::{Interfaces, Recorder, Settings, Tap};
-use crate::config::{AxisKind, CanLink, Config, Device, Http, Link, ModbusParameter, RollingRecording};
+use crate::config::{AxisKind, Config, Device, Http, Link, Modbus, ModbusParameter, RollingRecording};
 use crate::engine::Engine;
 use crate::engine::axis::rest::Unrested;
 use crate::engine::build::{BuildError, Built, Commissioners, Host, build};
 use crate::engine::direct::DirectNorth;
 use crate::engine::local::LocalNorth;
-use crate::engine::port::CanPort;
 use crate::engine::registers::RegisterNorth;
 use crate::history::Histories;
 use crate::host::HostPort;
@@ -59,19 +54,17 @@ use crate::local::protocol::NamedParameter;
 use crate::local::{Door, Hub, LocalServer, Shared, SocketFile};
 use crate::mapping::Mapping;
 use crate::modbus::{Binding, ModbusServer, Parameters};
-use crate::north::{self, ExplicitServer, ServeError};
+use crate::north::{self, ServeError};
 use crate::parameter::known::Catalogue;
 use crate::recording::{self, ContactDevice, Plan, Recording};
 use crate::settings::Store;
-use crate::simulate::can_bus::InProcessCan;
-use crate::simulate::drives::{InProcessDrives, SIMULATED_MAC};
+use crate::simulate::drives::SIMULATED_MAC;
 use crate::status::BoxStatus;
-use crate::sys::can_interface::{self, ConfigureError};
+use crate::sys::can_interface::ConfigureError;
 use crate::sys::can_socket;
-use crate::sys::interface_lock::{InterfaceLock, LockError};
+use crate::sys::interface_lock::LockError;
 use crate::sys::thread::{self, SMALL_STACK, STACK};
-use crate::sys::udp::{BindError, IoSocket, PORT_IO};
-use crate::time::object::time_sync;
+use crate::sys::udp::BindError;
 use crate::time::source::{Place, SourceError, TimeService, TimeView};
 
 /// How often the commissioning of drives that come later goes on.
@@ -80,14 +73,8 @@ const COMMISSION_INTERVAL: Duration = Duration::from_millis(5);
 /// How often notices are taken from the cycle thread.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
 
-/// After how many milliseconds a CAN controller that is off the bus starts again by itself.
-const CAN_RESTART_MS: u32 = 100;
-
 /// Records that each tap of a recording to a file can hold: a disk can be slow for a second.
 const CAPTURE_DEPTH: usize = 4_096;
-
-/// Frames that the transmit queue of a CAN interface holds: the RPDOs of a cycle, and more. Linux gives ten.
-const CAN_QUEUE: u32 = 128;
 
 /// Why the box cannot start.
 #[derive(Debug, thiserror::Error)]
@@ -238,62 +225,15 @@ pub fn start(
     extras: Extras<'_>,
     settings: &Arc<Store>,
 ) -> Result<RunningBox, StartError> {
-    let wire = match config.sercos.as_ref().map(|sercos| &sercos.link) {
-        Some(Link::Interface { name, ring }) => Some(PacketPort::open(name, ring.as_deref())?),
-        Some(Link::InProcess { .. }) | None => None,
-    };
+    let wire = south::sercos_wire(config)?;
     let mac = wire.as_ref().map_or(SIMULATED_MAC, PacketPort::mac);
     let recording = rolling(config, &mapping);
     let Built { mut engine, mut adapters, notices, status, commissioners } =
         build(config, mapping, Host { mac, incarnation: incarnation() })?;
     let (recorder, mut taps) = record(config, extras.capture, recording.as_ref())?;
-    let mut tap = || taps.pop();
-    let mut south = Vec::with_capacity(engine.buses().len());
-    if let Some(sercos) = &config.sercos {
-        south.push(OpenPort::Ethernet(match wire {
-            Some(wire) => Box::new(wire.recorded(tap())),
-            None => Box::new(InProcessDrives::of(config, sercos, tap())),
-        }));
-    }
-    let mut watches = Vec::new();
-    for (number, can) in (0..).zip(&config.can) {
-        let tap = tap().map(|tap| (tap, number));
-        south.push(OpenPort::Can(can_port(&can.link, can.bit_rate, &mut watches, tap, |tap| {
-            Box::new(InProcessCan::of(can, tap).in_host_time(can.cycle_time))
-        })?));
-    }
-    for (number, network) in (config.can.len()..).zip(&config.devicenet) {
-        let tap = tap().zip(u8::try_from(number).ok());
-        south.push(OpenPort::Can(can_port(&network.link, network.bit_rate(), &mut watches, tap, |tap| {
-            Box::new(InProcessCan::of_devicenet(network, tap).in_host_time(network.cycle_time))
-        })?));
-    }
-    let mut north = Vec::with_capacity(config.devices.len());
-    let mut markers = Vec::with_capacity(config.devices.len());
+    let (south, watches) = south::open(config, wire, &mut taps)?;
     let ports: Vec<_> = config.devices.iter().map(|device| HostPort::find(device.listen)).collect();
-    for ((device, (adapter, _)), port) in config.devices.iter().zip(&mut adapters).zip(&ports) {
-        if let Some(port) = port {
-            port.describe(adapter);
-        }
-        settings.apply(&device.name, adapter);
-        let address = SocketAddrV4::new(device.listen, PORT_IO);
-        // Nothing comes in before there is a connection. That of a device with assemblies stays open: it has several
-        // connections, and the gate lets one through.
-        let (socket, gate) = match device.assembly {
-            None => {
-                let (socket, gate) = IoSocket::bind_closed(address, adapter.qos.urgent)?;
-                (socket, Some(Arc::new(gate)))
-            }
-            Some(_) => {
-                let socket = IoSocket::bind(address, adapter.qos.urgent)?;
-                socket.prepare_multicast()?;
-                (socket, None)
-            }
-        };
-        let system = |source| BindError::System { address, step: "dup", source };
-        markers.push((socket.marker().map_err(system)?, gate));
-        north.push(UdpPort::new(socket, tap()));
-    }
+    let (north, markers) = devices::open_io(config, (&mut adapters, &ports), settings, &mut taps)?;
 
     let histories = extras.histories.cloned().unwrap_or_default();
     for (axis, of) in engine.axes_mut().iter_mut().zip(&config.axes) {
@@ -302,92 +242,28 @@ pub fn start(
     let limit = Arc::new(LineLimit::default());
     let (time, feed) = TimeService::start(&config.time, &clock_place(&adapters, &ports))?;
 
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .thread_name("axisbridge-aux")
-        .thread_stack_size(STACK)
-        .build()
-        .map_err(|source| StartError::Thread { what: "the runtime of the servers", source })?;
+    let runtime = auxiliary_runtime()?;
     let _inside = runtime.enter();
-    let mut servers = Vec::with_capacity(adapters.len());
     let named = config.devices.iter().zip(&adapters);
     let sheets: Vec<_> =
         named.map(|(device, (adapter, _))| (device.name.clone(), adapter.eds.clone())).collect();
     let restart = Arc::new(AtomicBool::new(false));
+    let shared = ServerParts {
+        status: &status,
+        settings,
+        recording: recording.as_ref(),
+        time: (config.time.source, &time),
+        limit: &limit,
+        restart: &restart,
+    };
+    let mut servers = Vec::with_capacity(adapters.len());
     let parts = adapters.into_iter().zip(ports).zip(markers);
-    for (number, (device, (((adapter_config, end), port), (marker, gate)))) in
-        config.devices.iter().zip(parts).enumerate()
-    {
-        let mut adapter = Adapter::new(adapter_config)
-            .map_err(|error| StartError::Adapter { name: device.name.clone(), error })?;
-        adapter.hide_connection_ids(secret());
-        let (source, asked) = (status.clone(), Arc::clone(&restart));
-        let observer = recording.clone();
-        let (kept, keeper, name) = (Arc::clone(settings), Arc::clone(settings), device.name.clone());
-        let (clock, clock_source, setter) = (time.view(), config.time.source, time.setter());
-        let address = SocketAddrV4::new(device.listen, PORT_IO);
-        let mut drops = gate.as_ref().map(|gate| DropWatch::new(Arc::clone(gate), address));
-        let server = ExplicitServer::bind(device.listen, adapter, end, tap())?
-            .serve_tools(device.tools.clone())
-            .limit_lines(Arc::clone(&limit))
-            .attend(move |adapter| {
-                if let Some(drops) = &mut drops {
-                    drops.look();
-                }
-                let of_axes = health(&source.read(), number);
-                let minor_recoverable = of_axes.minor_recoverable || kept.is_unsaved();
-                adapter.set_health(Health { minor_recoverable, ..of_axes });
-                adapter.set_time_sync(time_sync(clock_source, &clock.read()));
-                if let Some(port) = &port {
-                    adapter.set_link(port.state());
-                }
-            })
-            .on_open(move |open| {
-                // Data are sent unmarked rather than not at all.
-                if let Err(error) = marker.mark(open.t_to_o_dscp) {
-                    warn!(dscp = open.t_to_o_dscp, %error, "the datagrams of the connection carry no DSCP mark");
-                }
-            })
-            .on_admit(move |admitted| {
-                // The cycle refuses what the kernel lets through, at its own cost.
-                if let Some(gate) = &gate
-                    && let Err(error) = gate.set(admitted)
-                {
-                    warn!(%error, "the kernel does not drop foreign datagrams");
-                }
-            })
-            .on_event(move |event| {
-                if let Some(recording) = &observer {
-                    recording.note_event(number, event);
-                }
-                if let Err(error) = keeper.note(&name, event) {
-                    warn!(device = name, %error, "the settings cannot be written; they last until Axisbridge ends");
-                }
-                match event {
-                    Event::Reset { .. } => asked.store(true, Ordering::Relaxed),
-                    Event::TimeSyncSet(setting) => setter.set(*setting),
-                    _ => {}
-                }
-            });
-        info!(device = device.name, address = %server.local_address(), "EtherNet/IP");
-        servers.push(north::spawn(server)?);
+    for (number, (device, (((adapter, end), port), marker))) in config.devices.iter().zip(parts).enumerate() {
+        let parts = DeviceParts { adapter, end, port, marker };
+        servers.push(shared.serve((number, device), parts, &mut taps)?);
     }
     if let Some(modbus) = &config.modbus {
-        let parameters = modbus_parameters(&modbus.parameters, &mut engine, &runtime)?;
-        let server = runtime
-            .block_on(ModbusServer::bind(modbus.listen, modbus.clients_max))
-            .map_err(|source| StartError::Modbus { address: modbus.listen, source })?
-            .with_parameters(parameters)
-            .serve(modbus.clients.clone())
-            .limit_lines(Arc::clone(&limit));
-        info!(address = %modbus.listen, "Modbus TCP");
-        let source = status.clone();
-        runtime.spawn(async move {
-            if let Err(error) = server.run(source).await {
-                warn!(%error, "Modbus TCP ended");
-            }
-        });
+        serve_modbus(modbus, &mut engine, &status, (&limit, &runtime))?;
     }
     let sources = Arc::new(Sources {
         config: config.clone(),
@@ -449,6 +325,41 @@ pub fn start(
         recording,
         _socket: socket,
     })
+}
+
+/// The runtime of the servers and of everything else beside the cycle.
+fn auxiliary_runtime() -> Result<tokio::runtime::Runtime, StartError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .thread_name("axisbridge-aux")
+        .thread_stack_size(STACK)
+        .build()
+        .map_err(|source| StartError::Thread { what: "the runtime of the servers", source })
+}
+
+/// Serves the registers to Modbus TCP clients.
+fn serve_modbus(
+    modbus: &Modbus,
+    engine: &mut Engine,
+    status: &Reader<BoxStatus>,
+    (limit, runtime): (&Arc<LineLimit>, &tokio::runtime::Runtime),
+) -> Result<(), StartError> {
+    let parameters = modbus_parameters(&modbus.parameters, engine, runtime)?;
+    let server = runtime
+        .block_on(ModbusServer::bind(modbus.listen, modbus.clients_max))
+        .map_err(|source| StartError::Modbus { address: modbus.listen, source })?
+        .with_parameters(parameters)
+        .serve(modbus.clients.clone())
+        .limit_lines(Arc::clone(limit));
+    info!(address = %modbus.listen, "Modbus TCP");
+    let source = status.clone();
+    runtime.spawn(async move {
+        if let Err(error) = server.run(source).await {
+            warn!(%error, "Modbus TCP ended");
+        }
+    });
+    Ok(())
 }
 
 /// Lets the HTTP server show the state.
@@ -551,31 +462,6 @@ fn clock_place<End>(adapters: &[(AdapterConfig, End)], ports: &[Option<HostPort>
     }
 }
 
-/// The port of a bus on CAN.
-pub(crate) fn can_port(
-    link: &CanLink,
-    bit_rate: BitRate,
-    watches: &mut Vec<CanWatch>,
-    tap: Option<(Tap, u8)>,
-    in_process: impl FnOnce(Option<(Tap, u8)>) -> Box<dyn CanPort + Send>,
-) -> Result<Box<dyn CanPort + Send>, StartError> {
-    let CanLink::Interface { name, set_bit_rate } = link else { return Ok(in_process(tap)) };
-    // Before anything is set: that would disturb the master that there is.
-    let lock = InterfaceLock::take(name)?;
-    if *set_bit_rate {
-        let settings = can_interface::Settings {
-            bit_rate: Some(bit_rate),
-            restart_ms: Some(CAN_RESTART_MS),
-            queue: Some(CAN_QUEUE),
-            ..can_interface::Settings::default()
-        };
-        can_interface::configure(name, &settings)?;
-    }
-    let port = CanSocketPort::open(name, lock)?.recorded(tap);
-    watches.push(CanWatch::new(name.clone(), *set_bit_rate, port.back()));
-    Ok(Box::new(port))
-}
-
 /// Runs the commissioning of drives that come later, until the cycle thread has gone.
 fn commission(mut commissioners: Commissioners) -> Result<(), StartError> {
     let run = move || {
@@ -588,18 +474,6 @@ fn commission(mut commissioners: Commissioners) -> Result<(), StartError> {
         .spawn(run)
         .map(drop)
         .map_err(|source| StartError::Thread { what: "the commissioning of drives that come later", source })
-}
-
-/// How a device is, by its axes: what its Module Status LED shows is what its Identity object says.
-fn health(status: &BoxStatus, device: usize) -> Health {
-    let axes = || status.configured_axes().iter().filter(|axis| usize::from(axis.device) == device);
-    Health {
-        state: axes().next().map_or(ModuleState::Standby, |axis| axis.indicators.module),
-        // A controller has given every axis its attributes.
-        configured: axes().all(|axis| axis.cip_axis_state != AxisStateCode::INITIALIZING.0),
-        minor_recoverable: axes().any(|axis| axis.indicators.minor_fault),
-        ..Health::default()
-    }
 }
 
 /// Starts the recorder thread, where there is something to record, with a tap for each place where traffic is seen.
@@ -667,11 +541,6 @@ fn incarnation() -> u16 {
     let seconds = WallClock::now().duration_since(WallClock::UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let [low, high, ..] = seconds.to_le_bytes();
     u16::from_le_bytes([low, high]).max(1)
-}
-
-/// A number that nobody can guess: the standard library seeds its hash tables from the system's random numbers.
-fn secret() -> u64 {
-    RandomState::new().build_hasher().finish()
 }
 
 /// Logs what the indicators show whenever it changes, until the box has ended.

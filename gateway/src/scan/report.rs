@@ -43,45 +43,50 @@ pub fn text(bus: &Bus, dictionary: &SercosDictionary) -> String {
         let _ = writeln!(out, "! {finding}");
     }
     for slave in &bus.slaves {
-        let _ = writeln!(out, "\n{}: {}", place(slave), title(slave));
-        let mut line = |what: &str, value: &str| {
-            let _ = writeln!(out, "  {what:<22} {value}");
-        };
-        if slave.lost {
-            line("state", "went away during the scan");
-        }
-        if let Some(vendor) = vendor(slave) {
-            line("vendor", &vendor);
-        }
-        for (what, idn) in LINES {
-            if let Some(text) = slave.text(idn) {
-                line(what, &text);
-            }
-        }
-        line("profile", &profile(slave, dictionary));
-        let classes: Vec<_> = slave.facts.classes.iter().map(ToString::to_string).collect();
-        line("classes", &classes.join(", "));
-        line("connections", &slave.facts.connections.to_string());
-        for (number, mode) in modes(slave, dictionary).iter().enumerate() {
-            line(if number == 0 { "operation modes" } else { "" }, mode);
-        }
-        for (what, idn) in SCALINGS {
-            if let Some(value) = slave.number(idn) {
-                line(&format!("{what} scaling"), &scaling(dictionary, idn, value));
-            }
-        }
-        if let Some(text) = slave.text(Idn::DIAGNOSTIC_MESSAGE) {
-            line("diagnosis", &text);
-        }
-        for answer in &slave.answers {
-            if let Err(failure) = &answer.data
-                && !failure.is_absent()
-            {
-                line("not read", &format!("{}: {failure}", answer.idn));
-            }
-        }
+        lines(&mut out, slave, dictionary);
     }
     out
+}
+
+/// A slave, line by line.
+fn lines(out: &mut String, slave: &Found, dictionary: &SercosDictionary) {
+    let _ = writeln!(out, "\n{}: {}", place(slave), title(slave));
+    let mut line = |what: &str, value: &str| {
+        let _ = writeln!(out, "  {what:<22} {value}");
+    };
+    if slave.lost {
+        line("state", "went away during the scan");
+    }
+    if let Some(vendor) = vendor(slave) {
+        line("vendor", &vendor);
+    }
+    for (what, idn) in LINES {
+        if let Some(text) = slave.text(idn) {
+            line(what, &text);
+        }
+    }
+    line("profile", &profile(slave, dictionary));
+    let classes: Vec<_> = slave.facts.classes.iter().map(ToString::to_string).collect();
+    line("classes", &classes.join(", "));
+    line("connections", &slave.facts.connections.to_string());
+    for (number, mode) in modes(slave, dictionary).iter().enumerate() {
+        line(if number == 0 { "operation modes" } else { "" }, mode);
+    }
+    for (what, idn) in SCALINGS {
+        if let Some(value) = slave.number(idn) {
+            line(&format!("{what} scaling"), &scaling(dictionary, idn, value));
+        }
+    }
+    if let Some(text) = slave.text(Idn::DIAGNOSTIC_MESSAGE) {
+        line("diagnosis", &text);
+    }
+    for answer in &slave.answers {
+        if let Err(failure) = &answer.data
+            && !failure.is_absent()
+        {
+            line("not read", &format!("{}: {failure}", answer.idn));
+        }
+    }
 }
 
 /// The findings as one JSON object.

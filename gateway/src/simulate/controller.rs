@@ -89,113 +89,196 @@ pub fn run(
 ) -> Result<Report, RunError> {
     // One that a script names stays: it may be meant to be refused.
     let is_named = config.grand_master != Some(HOST_CLOCK);
-    let mut grandmaster = clock.grandmaster();
+    let grandmaster = clock.grandmaster();
     if !is_named && grandmaster.is_some() {
         config.grand_master = grandmaster;
     }
-    let mut controller = Controller::new(config, program)?;
+    let controller = Controller::new(config, program)?;
     // A controller is a real-time device too; where the host refuses, its updates only come less evenly.
     let _ = realtime::apply(&realtime::Request { priority: Some(PRIORITY), ..realtime::Request::default() });
     let io = IoSocket::bind(SocketAddrV4::new(endpoints.bind, PORT_IO), DSCP_URGENT)?;
-    let target = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
-    let stream = connect(target, endpoints.bind).map_err(|source| RunError::Connect { target, source })?;
-    let mut time = TimeBase::new(clock.first_sample());
-    let mut buffer = [0_u8; if DATAGRAM_MAX > STREAM_CHUNK { DATAGRAM_MAX } else { STREAM_CHUNK }];
-    let mut outgoing = Vec::with_capacity(STREAM_CHUNK);
-    // Gone when either side has closed it.
-    let mut stream = Some(stream);
-    // Another one is being opened, while the motion connection goes on.
-    let mut opening: Option<Receiver<io::Result<TcpStream>>> = None;
-    let mut stopping = false;
-    controller.tcp_connected(clock.now());
-    while !controller.is_closed() {
-        if let Some(sample) = clock.sample() {
+    let explicit = SocketAddrV4::new(endpoints.target, PORT_EXPLICIT);
+    let stream =
+        connect(explicit, endpoints.bind).map_err(|source| RunError::Connect { target: explicit, source })?;
+    let mut run = Run {
+        endpoints,
+        explicit,
+        time: TimeBase::new(clock.first_sample()),
+        clock,
+        grandmaster,
+        is_named,
+        controller,
+        io,
+        stream: Some(stream),
+        opening: None,
+        outgoing: Vec::with_capacity(STREAM_CHUNK),
+        buffer: [0; BUFFER],
+        stopping: false,
+    };
+    run.controller.tcp_connected(run.clock.now());
+    while !run.controller.is_closed() {
+        run.follow_clock();
+        run.follow_stop(stop);
+        run.take_opened()?;
+        run.read_stream();
+        run.read_datagrams()?;
+        run.handle_time();
+        run.send_datagrams()?;
+        run.send_stream();
+        run.follow_stream_action();
+        while let Some(event) = run.controller.poll_event() {
+            on_event(&event);
+        }
+        run.wait()?;
+    }
+    Ok(run.controller.report())
+}
+
+/// Of what is sent and received at once, the larger.
+const BUFFER: usize = if DATAGRAM_MAX > STREAM_CHUNK { DATAGRAM_MAX } else { STREAM_CHUNK };
+
+/// A run of a program on its sockets.
+struct Run<'c> {
+    endpoints: Endpoints,
+    /// The device's explicit side.
+    explicit: SocketAddrV4,
+    clock: &'c mut ControllerTime,
+    time: TimeBase,
+    /// The one that `clock` follows.
+    grandmaster: Option<[u8; 8]>,
+    /// A script names the grandmaster.
+    is_named: bool,
+    controller: Controller,
+    io: IoSocket,
+    /// Gone when either side has closed it.
+    stream: Option<TcpStream>,
+    /// Another one is being opened, while the motion connection goes on.
+    opening: Option<Receiver<io::Result<TcpStream>>>,
+    /// What the stream has not taken yet.
+    outgoing: Vec<u8>,
+    buffer: [u8; BUFFER],
+    stopping: bool,
+}
+
+impl Run<'_> {
+    fn follow_clock(&mut self) {
+        if let Some(sample) = self.clock.sample() {
             // A step of the clock is told to the device with the controller's time offset.
-            time.feed(&sample);
+            self.time.feed(&sample);
         }
-        let followed = clock.grandmaster();
-        if followed != grandmaster {
-            grandmaster = followed;
-            if let Some(followed) = followed.filter(|_| !is_named) {
-                controller.set_grand_master(followed);
+        let followed = self.clock.grandmaster();
+        if followed != self.grandmaster {
+            self.grandmaster = followed;
+            if let Some(followed) = followed.filter(|_| !self.is_named) {
+                self.controller.set_grand_master(followed);
             }
         }
-        if stop.load(Ordering::Relaxed) && !stopping {
-            stopping = true;
-            controller.interrupt(clock.now());
+    }
+
+    fn follow_stop(&mut self, stop: &AtomicBool) {
+        if stop.load(Ordering::Relaxed) && !self.stopping {
+            self.stopping = true;
+            self.controller.interrupt(self.clock.now());
         }
-        if let Some(opened) = opening.as_ref().and_then(outcome) {
-            opening = None;
-            match opened {
-                Ok(opened) => {
-                    stream = Some(opened);
-                    controller.tcp_connected(clock.now());
-                }
-                // The axes are led by the motion connection, which is still there.
-                Err(_) if controller.is_connected() => controller.tcp_closed(clock.now()),
-                Err(source) => return Err(RunError::Connect { target, source }),
+    }
+
+    /// Takes the stream that was being opened.
+    fn take_opened(&mut self) -> Result<(), RunError> {
+        let Some(opened) = self.opening.as_ref().and_then(outcome) else { return Ok(()) };
+        self.opening = None;
+        match opened {
+            Ok(opened) => {
+                self.stream = Some(opened);
+                self.controller.tcp_connected(self.clock.now());
             }
+            // The axes are led by the motion connection, which is still there.
+            Err(_) if self.controller.is_connected() => self.controller.tcp_closed(self.clock.now()),
+            Err(source) => return Err(RunError::Connect { target: self.explicit, source }),
         }
-        while let Some(open) = &mut stream {
-            match open.read(&mut buffer[..STREAM_CHUNK]) {
+        Ok(())
+    }
+
+    fn read_stream(&mut self) {
+        while let Some(open) = &mut self.stream {
+            match open.read(&mut self.buffer[..STREAM_CHUNK]) {
                 Ok(length) if length > 0 => {
-                    controller.handle_stream(clock.now(), &buffer[..length]);
+                    self.controller.handle_stream(self.clock.now(), &self.buffer[..length]);
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
                 // However a stream breaks, it is as good as closed by the device.
                 Ok(_) | Err(_) => {
-                    stream = None;
-                    controller.tcp_closed(clock.now());
+                    self.stream = None;
+                    self.controller.tcp_closed(self.clock.now());
                 }
             }
         }
-        while let Some(datagram) = io.recv(&mut buffer).map_err(udp_error)? {
+    }
+
+    fn read_datagrams(&mut self) -> Result<(), RunError> {
+        while let Some(datagram) = self.io.recv(&mut self.buffer).map_err(udp_error)? {
             // A longer datagram than any of ours, or one from elsewhere, is none of the device's.
-            if !datagram.truncated && *datagram.from.ip() == endpoints.target {
-                let bytes = &buffer[..datagram.len];
-                let now = clock.now();
-                controller.handle_datagram(now, time.system_at(now), bytes);
+            if !datagram.truncated && *datagram.from.ip() == self.endpoints.target {
+                let bytes = &self.buffer[..datagram.len];
+                let now = self.clock.now();
+                self.controller.handle_datagram(now, self.time.system_at(now), bytes);
             }
         }
-        let now = clock.now();
-        controller.handle_time(now, time.system_at(now));
-        while let Some(length) = controller.poll_datagram_transmit(&mut buffer) {
-            match io.send_to(&buffer[..length], destination(&controller, endpoints.target)) {
+        Ok(())
+    }
+
+    fn handle_time(&mut self) {
+        let now = self.clock.now();
+        self.controller.handle_time(now, self.time.system_at(now));
+    }
+
+    fn send_datagrams(&mut self) -> Result<(), RunError> {
+        while let Some(length) = self.controller.poll_datagram_transmit(&mut self.buffer) {
+            let destination = destination(&self.controller, self.endpoints.target);
+            match self.io.send_to(&self.buffer[..length], destination) {
                 // A full queue loses this update; the device counts it.
                 Err(error) if error.kind() != io::ErrorKind::WouldBlock => return Err(udp_error(error)),
                 _ => {}
             }
         }
-        while let Some(length) = controller.poll_stream_transmit(&mut buffer) {
-            outgoing.extend_from_slice(&buffer[..length]);
+        Ok(())
+    }
+
+    fn send_stream(&mut self) {
+        while let Some(length) = self.controller.poll_stream_transmit(&mut self.buffer) {
+            self.outgoing.extend_from_slice(&self.buffer[..length]);
         }
-        if flush(stream.as_mut(), &mut outgoing).is_err() {
-            stream = None;
-            outgoing.clear();
-            controller.tcp_closed(clock.now());
+        if flush(self.stream.as_mut(), &mut self.outgoing).is_err() {
+            self.stream = None;
+            self.outgoing.clear();
+            self.controller.tcp_closed(self.clock.now());
         }
-        match controller.poll_stream_action() {
-            Some(StreamAction::Close) => stream = None,
+    }
+
+    /// Closes the stream or opens another, as the controller wants.
+    fn follow_stream_action(&mut self) {
+        match self.controller.poll_stream_action() {
+            Some(StreamAction::Close) => self.stream = None,
             Some(StreamAction::Reopen) => {
-                drop(stream.take());
-                outgoing.clear();
-                opening = Some(connect_aside(target, endpoints.bind));
+                drop(self.stream.take());
+                self.outgoing.clear();
+                self.opening = Some(connect_aside(self.explicit, self.endpoints.bind));
             }
             None => {}
         }
-        while let Some(event) = controller.poll_event() {
-            on_event(&event);
-        }
-        let now = clock.now();
-        let latest = now + if outgoing.is_empty() { LOOK_INTERVAL } else { FULL_INTERVAL };
-        let wake = controller.wake_at().map_or(latest, |due| due.min(latest));
-        if wake > now {
-            let timeout = Duration::from_nanos(wake.since(now).as_nanos().unsigned_abs());
-            udp::wait(&io, stream.as_ref(), timeout)
+    }
+
+    /// Waits until something comes or is due.
+    fn wait(&self) -> Result<(), RunError> {
+        let now = self.clock.now();
+        let latest = now + if self.outgoing.is_empty() { LOOK_INTERVAL } else { FULL_INTERVAL };
+        let due = self.controller.wake_at().map_or(latest, |due| due.min(latest));
+        if due > now {
+            let timeout = Duration::from_nanos(due.since(now).as_nanos().unsigned_abs());
+            udp::wait(&self.io, self.stream.as_ref(), timeout)
                 .map_err(|source| RunError::Socket { what: "waiting for the sockets", source })?;
         }
+        Ok(())
     }
-    Ok(controller.report())
 }
 
 /// Where the device wants the C-to-D datagrams: at its own address and the usual port, where it does not say otherwise.

@@ -217,49 +217,17 @@ fn resolve_code(
     dictionary: &Cia402Dictionary,
     resolver: &mut Resolver<'_>,
 ) -> Option<Cia402Code> {
-    let number = *row.code.get_ref();
     let modes = Cia402Dictionary::modes(&row.modes, resolver);
-    let last = row.last.as_ref().map(|last| *last.get_ref());
+    let last = last_bit(row, set.kind, holder, resolver)?;
     let mask = row.mask.as_ref().map(|mask| *mask.get_ref());
-    let bits = match set.kind {
-        Cia402SetKind::Bits => {
-            let first = u32::try_from(number).unwrap_or(u32::MAX);
-            let end = last.unwrap_or(first);
-            if first > end || end >= holder.bits {
-                let message = format!("expected bits below {}, got {number} to {end}", holder.bits);
-                resolver.error(code::OUT_OF_RANGE, row.code.span(), "code", message);
-                return None;
-            }
-            Some(end)
-        }
-        Cia402SetKind::States => {
-            let outside = mask.is_none_or(|mask| number & !i64::from(mask) != 0);
-            if outside {
-                let message = "expected a `mask` that has every bit of the code";
-                resolver.error(code::FIELD_VALUE, row.code.span(), "mask", message);
-                return None;
-            }
-            None
-        }
-        Cia402SetKind::Codes => {
-            holder.fits(&row.code, "code", resolver);
-            None
-        }
-    };
-    let stray = (set.kind != Cia402SetKind::Bits && last.is_some())
+    let stray = (set.kind != Cia402SetKind::Bits && row.last.is_some())
         || (set.kind != Cia402SetKind::States && mask.is_some());
     if stray {
         let message = format!("`last` is of bits and `mask` of states, the set has {}", set.kind.name());
         resolver.error(code::CONTRADICTION, row.code.span(), "code", message);
     }
-    let (first, end) = (number, bits.map_or(number, i64::from));
-    let meets = |known: &Cia402Code| {
-        let shared =
-            known.modes.is_empty() || modes.is_empty() || known.modes.iter().any(|mode| modes.contains(mode));
-        let known_end = known.last.map_or(known.code, i64::from);
-        shared && known.code <= end && first <= known_end && (mask.is_none() || known.mask == mask)
-    };
-    if set.codes.iter().any(meets) {
+    let number = *row.code.get_ref();
+    if set.codes.iter().any(|known| known.meets((number, last), mask, &modes)) {
         resolver.error(code::TWICE, row.code.span(), "code", "the code is defined twice");
     }
     if set.codes.iter().any(|known| known.name == *row.name.get_ref()) {
@@ -268,13 +236,59 @@ fn resolve_code(
     let own = (row.source.as_ref(), row.confidence.as_ref());
     Some(Cia402Code {
         code: number,
-        last: bits,
+        last,
         mask,
         name: row.name.get_ref().clone(),
         modes,
         trust: dictionary.documents.trust_or(own, &set.trust, resolver),
         note: row.note.clone().unwrap_or_default(),
     })
+}
+
+/// The last bit of a row of bits, `Some(None)` for codes and states, `None` if the objects cannot hold what the row says.
+fn last_bit(
+    row: &Cia402CodeRow,
+    kind: Cia402SetKind,
+    holder: &Holder,
+    resolver: &mut Resolver<'_>,
+) -> Option<Option<u32>> {
+    let number = *row.code.get_ref();
+    match kind {
+        Cia402SetKind::Bits => {
+            let first = u32::try_from(number).unwrap_or(u32::MAX);
+            let end = row.last.as_ref().map_or(first, |last| *last.get_ref());
+            if first > end || end >= holder.bits {
+                let message = format!("expected bits below {}, got {number} to {end}", holder.bits);
+                resolver.error(code::OUT_OF_RANGE, row.code.span(), "code", message);
+                return None;
+            }
+            Some(Some(end))
+        }
+        Cia402SetKind::States => {
+            let outside = row.mask.as_ref().is_none_or(|mask| number & !i64::from(*mask.get_ref()) != 0);
+            if outside {
+                let message = "expected a `mask` that has every bit of the code";
+                resolver.error(code::FIELD_VALUE, row.code.span(), "mask", message);
+                return None;
+            }
+            Some(None)
+        }
+        Cia402SetKind::Codes => {
+            holder.fits(&row.code, "code", resolver);
+            Some(None)
+        }
+    }
+}
+
+impl Cia402Code {
+    /// Whether a code, or bits up to `last`, means the same value in a mode of both.
+    fn meets(&self, (code, last): (i64, Option<u32>), mask: Option<u32>, modes: &[&'static str]) -> bool {
+        let end = |code: i64, last: Option<u32>| last.map_or(code, i64::from);
+        let in_mode =
+            self.modes.is_empty() || modes.is_empty() || self.modes.iter().any(|mode| modes.contains(mode));
+        let overlaps = self.code <= end(code, last) && code <= end(self.code, self.last);
+        in_mode && overlaps && (mask.is_none() || self.mask == mask)
+    }
 }
 
 fn resolve_range(

@@ -139,6 +139,11 @@ fn constants(
     constants
 }
 
+/// The ends of a limit, by their keys.
+fn ends(row: &ComputedRow) -> [(&'static str, &[Name]); 3] {
+    [("least", &row.least), ("most", &row.most), ("within", &row.within)]
+}
+
 struct RowReader<'r, 'f, 'g> {
     resolver: &'r mut Resolver<'f>,
     dictionary: &'g GenericDictionary,
@@ -218,30 +223,10 @@ impl<'g> RowReader<'_, '_, 'g> {
             self.contradiction(&row.parameter, "parameter", message);
             return None;
         }
-        if let Some(first) = row.less.first().filter(|_| row.sum.is_empty()) {
-            self.contradiction(first, "less", "expected a `sum` from which this is taken away");
-        }
-        if let Some(by) = row.by.as_ref().filter(|_| row.selection.is_empty()) {
-            self.contradiction(by, "by", "expected a `selection`");
-        }
-        let ends = [("least", &row.least), ("most", &row.most), ("within", &row.within)];
-        for (key, names) in ends {
-            if let Some(first) = names.first().filter(|_| row.limit.is_none()) {
-                self.contradiction(first, key, "expected a `limit`, which this is an end of");
-            }
-        }
+        self.strays(row);
         let holds =
             row.at_limit.as_ref().map_or(Some(true), |name| self.resolver.word("at_limit", name, &AT_LIMIT));
-        let limits = [
-            ("sum", row.sum.len() + row.less.len(), OPERANDS_MAX),
-            ("product", row.product.len(), FACTORS_MAX),
-            ("selection", row.selection.len(), OPERANDS_MAX),
-            ("limit", row.least.len() + row.most.len() + row.within.len(), OPERANDS_MAX),
-        ];
-        for (key, count, limit) in limits.into_iter().filter(|(_, count, limit)| count > limit) {
-            let message = format!("expected at most {limit} operands, got {count}");
-            self.resolver.error(code::TOO_MANY, row.parameter.span(), key, message);
-        }
+        self.operand_counts(row);
         if !row.sum.is_empty() {
             let plus = self.operands("sum", &row.sum);
             let less = self.operands("less", &row.less);
@@ -254,15 +239,52 @@ impl<'g> RowReader<'_, '_, 'g> {
             let (dividend, divisor) = (self.operand("ratio", dividend), self.operand("ratio", divisor));
             return Some(Ways::Ratio([dividend?, divisor?]));
         }
-        if let Some(limited) = &row.limit {
-            let value = self.operand("limit", limited);
-            let [least, most, within] = ends.map(|(key, names)| self.operands(key, names));
-            if row.least.is_empty() && row.most.is_empty() && row.within.is_empty() {
-                let message = "expected `least`, `most` or `within`, between which the value is";
-                self.resolver.error(code::MISSING_KEY, limited.span(), "limit", message);
-            }
-            return Some(Ways::Limit(value?, [least?, most?, within?], holds?));
+        match &row.limit {
+            Some(limited) => self.limit(row, limited, holds),
+            None => self.selection(row),
         }
+    }
+
+    /// Keys that belong to another operation than that of the row.
+    fn strays(&mut self, row: &ComputedRow) {
+        if let Some(first) = row.less.first().filter(|_| row.sum.is_empty()) {
+            self.contradiction(first, "less", "expected a `sum` from which this is taken away");
+        }
+        if let Some(by) = row.by.as_ref().filter(|_| row.selection.is_empty()) {
+            self.contradiction(by, "by", "expected a `selection`");
+        }
+        for (key, names) in ends(row) {
+            if let Some(first) = names.first().filter(|_| row.limit.is_none()) {
+                self.contradiction(first, key, "expected a `limit`, which this is an end of");
+            }
+        }
+    }
+
+    fn operand_counts(&mut self, row: &ComputedRow) {
+        let limits = [
+            ("sum", row.sum.len() + row.less.len(), OPERANDS_MAX),
+            ("product", row.product.len(), FACTORS_MAX),
+            ("selection", row.selection.len(), OPERANDS_MAX),
+            ("limit", row.least.len() + row.most.len() + row.within.len(), OPERANDS_MAX),
+        ];
+        for (key, count, limit) in limits.into_iter().filter(|(_, count, limit)| count > limit) {
+            let message = format!("expected at most {limit} operands, got {count}");
+            self.resolver.error(code::TOO_MANY, row.parameter.span(), key, message);
+        }
+    }
+
+    /// A value between its ends; `holds` as [`AT_LIMIT`] has it.
+    fn limit(&mut self, row: &ComputedRow, limited: &Name, holds: Option<bool>) -> Option<Ways<'g>> {
+        let value = self.operand("limit", limited);
+        let [least, most, within] = ends(row).map(|(key, names)| self.operands(key, names));
+        if ends(row).iter().all(|(_, names)| names.is_empty()) {
+            let message = "expected `least`, `most` or `within`, between which the value is";
+            self.resolver.error(code::MISSING_KEY, limited.span(), "limit", message);
+        }
+        Some(Ways::Limit(value?, [least?, most?, within?], holds?))
+    }
+
+    fn selection(&mut self, row: &ComputedRow) -> Option<Ways<'g>> {
         let Some(by) = &row.by else {
             let message = "expected `by`, the parameter whose value selects";
             self.resolver.error(code::MISSING_KEY, row.parameter.span(), "by", message);

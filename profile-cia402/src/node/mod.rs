@@ -308,7 +308,7 @@ impl<A: Application> Node<A> {
             return;
         }
         let data = frame.data();
-        if frame.id() == cob_id::LSS_REQUEST && (self.state != NmtState::BOOT_UP || self.node.is_none()) {
+        if frame.id() == cob_id::LSS_REQUEST && self.hears_lss() {
             self.handle_lss(now, data);
             return;
         }
@@ -321,10 +321,7 @@ impl<A: Application> Node<A> {
             _ if !self.state.has_sdo() => {}
             _ if frame.id() == word(objects::COB_ID_SYNC).id() => self.handle_sync(now, data),
             _ if frame.id() == word(objects::COB_ID_TIME).id() && !word(objects::COB_ID_TIME).is_valid() => {
-                match TimeOfDay::parse(data) {
-                    Ok(time) => self.time = time,
-                    Err(_) => self.statistics.malformed += 1,
-                }
+                self.handle_time_stamp(data);
             }
             _ if self.is_mine(frame.id()) => {
                 self.errors.raise(ErrorCode::IDENTIFIER_COLLISION, COMMUNICATION, &mut self.dictionary);
@@ -333,6 +330,18 @@ impl<A: Application> Node<A> {
             _ => {}
         }
         self.tell(now);
+    }
+
+    /// A node that boots hears nothing, unless it waits for its node-id.
+    fn hears_lss(&self) -> bool {
+        self.state != NmtState::BOOT_UP || self.node.is_none()
+    }
+
+    fn handle_time_stamp(&mut self, data: &[u8]) {
+        match TimeOfDay::parse(data) {
+            Ok(time) => self.time = time,
+            Err(_) => self.statistics.malformed += 1,
+        }
     }
 
     fn handle_sdo(&mut self, now: MonotonicTime, data: &[u8]) {

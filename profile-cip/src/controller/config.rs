@@ -360,7 +360,6 @@ impl ControllerConfig {
     /// The first value out of its range.
     // Flat: one line per value, each with its error.
     pub fn check(&self) -> Result<(), ConfigError> {
-        let bad = |what, value: f64, wanted| Err(ConfigError::Value { what, value, wanted });
         if self.axes.is_empty() || self.axes.len() > MAX_AXES {
             let count = u32::try_from(self.axes.len()).unwrap_or(u32::MAX);
             return bad("number of axes", f64::from(count), "1 to 16");
@@ -384,26 +383,29 @@ impl ControllerConfig {
         if self.key.major_revision > 127 {
             return bad("major_revision", f64::from(self.key.major_revision), "0 to 127");
         }
-        for axis in &self.axes {
-            if let Scaling::Counts(scale) = axis.scaling
-                && !(scale.is_finite() && scale > 0.0)
-            {
-                return bad("counts_per_unit", scale, "a finite number above zero");
-            }
-            if !(1..=4).contains(&axis.control_mode.0) {
-                let wanted = "1 (position), 2 (velocity), 3 (acceleration) or 4 (torque)";
-                return bad("control_mode", f64::from(axis.control_mode.0), wanted);
-            }
-            if let Some((what, value)) = axis.limits.first_bad() {
-                return bad(
-                    what,
-                    value,
-                    "a finite number above zero, and the lower position below the upper one",
-                );
-            }
-        }
-        Ok(())
+        self.axes.iter().try_for_each(check_axis)
     }
+}
+
+/// The first value of an axis that is out of its range.
+fn check_axis(axis: &AxisSetup) -> Result<(), ConfigError> {
+    if let Scaling::Counts(scale) = axis.scaling
+        && !(scale.is_finite() && scale > 0.0)
+    {
+        return bad("counts_per_unit", scale, "a finite number above zero");
+    }
+    if !(1..=4).contains(&axis.control_mode.0) {
+        let wanted = "1 (position), 2 (velocity), 3 (acceleration) or 4 (torque)";
+        return bad("control_mode", f64::from(axis.control_mode.0), wanted);
+    }
+    if let Some((what, value)) = axis.limits.first_bad() {
+        return bad(what, value, "a finite number above zero, and the lower position below the upper one");
+    }
+    Ok(())
+}
+
+fn bad(what: &'static str, value: f64, wanted: &'static str) -> Result<(), ConfigError> {
+    Err(ConfigError::Value { what, value, wanted })
 }
 
 /// What cannot work in a configuration or a program.

@@ -561,14 +561,18 @@ impl Checker {
             self.violation(at, offender, Rule::OutsideSlots { telegram, offset: Some(offset) });
         } else if writes && usize::from(slave) == topology {
             // In a ring the S telegram counts from the other end; the P telegram gives the number.
-            let word = u16_at(after, 2 * topology);
-            while self.stations.len() < topology {
-                self.stations.push(Station::default());
-            }
-            let station = &mut self.stations[topology - 1];
-            station.address = TopologyField(word).address().unwrap_or(0);
-            station.inserts = word != NO_SLAVE;
+            self.note_station(topology, u16_at(after, 2 * topology));
         }
+    }
+
+    /// Notes what a slave has written into its topology field, by its place from 1.
+    fn note_station(&mut self, topology: usize, word: u16) {
+        while self.stations.len() < topology {
+            self.stations.push(Station::default());
+        }
+        let station = &mut self.stations[topology - 1];
+        station.address = TopologyField(word).address().unwrap_or(0);
+        station.inserts = word != NO_SLAVE;
     }
 }
 

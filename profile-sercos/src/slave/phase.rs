@@ -95,6 +95,16 @@ pub struct Transition {
     pub fault: Option<Fault>,
 }
 
+impl Transition {
+    const fn to(next: State) -> Self {
+        Self { next, fault: None }
+    }
+
+    const fn fail(fault: Fault) -> Self {
+        Self { next: State::Nrt, fault: Some(fault) }
+    }
+}
+
 impl State {
     /// The phase whose telegram layout is in force.
     pub const fn phase(self) -> Option<Phase> {
@@ -113,59 +123,63 @@ impl State {
     #[must_use]
     // Flat: the table above, one arm per row.
     pub fn next(self, event: Event, conditions: Conditions) -> Transition {
-        let to = |next| Transition { next, fault: None };
-        let fail = |fault| Transition { next: State::Nrt, fault: Some(fault) };
-        let field = match (event, self) {
+        match (event, self) {
             (
                 Event::MstTimeout,
                 State::In(Phase::CP3 | Phase::CP4) | State::Switching(Phase::CP3, Phase::CP4),
-            ) => return fail(Fault::MstLoss),
+            ) => Transition::fail(Fault::MstLoss),
             // Before CP3, or after a switch down to CP0 was announced, the master may stop without harm.
-            (Event::MstTimeout, _) => return to(State::Nrt),
+            (Event::MstTimeout, _) => Transition::to(State::Nrt),
             (Event::Joined, State::Joining(Stage::Setup))
                 if conditions.cp3_checked && conditions.cp4_checked =>
             {
-                return to(State::In(Phase::CP4));
+                Transition::to(State::In(Phase::CP4))
             }
-            (Event::Joined, _) => return to(self),
-            (Event::Mst(field), State::Joining(_)) => {
-                let goes_on = field.phase() == Phase::CP4 || field.phase() == Phase::CP0 && field.switching();
-                if goes_on && !(field.phase() == Phase::CP4 && field.switching()) {
-                    return to(self);
-                }
-                field
-            }
-            (Event::Mst(field), _) => field,
-        };
+            (Event::Joined, _) => Transition::to(self),
+            (Event::Mst(field), _) => match self.phase() {
+                Some(current) => self.follow(current, field, conditions),
+                None => Transition::to(self.outside(field)),
+            },
+        }
+    }
+
+    /// The state after an MST outside of the phases: joining goes on in a ring in CP4, and a scan begins in CP0.
+    fn outside(self, field: PhaseField) -> State {
+        match (self, field.phase(), field.switching()) {
+            (State::Joining(_), Phase::CP4, false) | (State::Joining(_), Phase::CP0, true) => self,
+            (_, Phase::CP0, false) => State::In(Phase::CP0),
+            _ => State::Nrt,
+        }
+    }
+
+    /// The state after an MST in a phase.
+    fn follow(self, current: Phase, field: PhaseField, conditions: Conditions) -> Transition {
         let (wanted, announced) = (field.phase(), field.switching());
-        let Some(current) = self.phase() else {
-            let scan = wanted == Phase::CP0 && !announced;
-            return to(if scan { State::In(Phase::CP0) } else { State::Nrt });
-        };
         if !wanted.is_defined() {
-            return fail(Fault::InvalidPhase);
+            return Transition::fail(Fault::InvalidPhase);
         }
         if wanted == Phase::CP0 {
-            let announced = announced && current != Phase::CP0;
-            return to(if announced { State::Switching(current, wanted) } else { State::In(wanted) });
+            let switches = announced && current != Phase::CP0;
+            let next = if switches { State::Switching(current, wanted) } else { State::In(wanted) };
+            return Transition::to(next);
         }
         if wanted < current {
-            return fail(Fault::Downshift);
+            return Transition::fail(Fault::Downshift);
         }
         if wanted == current {
-            return to(State::In(current));
+            return Transition::to(State::In(current));
         }
         if current.next() != Some(wanted) {
-            return fail(Fault::Upshift);
+            return Transition::fail(Fault::Upshift);
         }
         match self {
-            _ if announced => to(State::Switching(current, wanted)),
+            _ if announced => Transition::to(State::Switching(current, wanted)),
             State::Switching(_, target) if target == wanted => match wanted {
-                Phase::CP3 if !conditions.cp3_checked => fail(Fault::NotReady),
-                Phase::CP4 if !conditions.cp4_checked => fail(Fault::NotReady),
-                _ => to(State::In(wanted)),
+                Phase::CP3 if !conditions.cp3_checked => Transition::fail(Fault::NotReady),
+                Phase::CP4 if !conditions.cp4_checked => Transition::fail(Fault::NotReady),
+                _ => Transition::to(State::In(wanted)),
             },
-            _ => fail(Fault::Upshift),
+            _ => Transition::fail(Fault::Upshift),
         }
     }
 }

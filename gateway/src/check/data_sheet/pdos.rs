@@ -38,6 +38,11 @@ pub fn troubles(description: &DeviceDescription, node: NodeId, set: &PdoSet) -> 
     all
 }
 
+/// The transmission types of a PDO, the wanted one first.
+fn types(pdo: &PdoConfig) -> impl Iterator<Item = TransmissionType> {
+    core::iter::once(&pdo.transmission).chain(pdo.others).copied()
+}
+
 /// One PDO.
 struct Walk<'a> {
     description: &'a DeviceDescription,
@@ -117,17 +122,25 @@ impl Walk<'_> {
 
     /// The transmission type that the PDO would be used with.
     fn transmission(&mut self) -> TransmissionType {
-        let object = self.parameter(SUB_TYPE);
         let wanted = self.pdo.transmission;
-        let all = || core::iter::once(&self.pdo.transmission).chain(self.pdo.others).copied();
-        let mut first = None;
-        for kind in all() {
-            match self.takes(object, &[kind.0]) {
-                Ok(()) if kind == wanted => return kind,
-                Ok(()) => {
+        match self.written_type() {
+            Ok(kind) => {
+                if kind != wanted {
                     self.other_type(kind);
-                    return kind;
                 }
+                kind
+            }
+            Err(code) => self.kept_type(code),
+        }
+    }
+
+    /// The first of the types that the device takes; else why it does not take the wanted one.
+    fn written_type(&self) -> Result<TransmissionType, AbortCode> {
+        let object = self.parameter(SUB_TYPE);
+        let mut first = None;
+        for kind in types(self.pdo) {
+            match self.takes(object, &[kind.0]) {
+                Ok(()) => return Ok(kind),
                 Err(code) => {
                     first = first.or(Some(code));
                     if matches!(code, AbortCode::READ_ONLY | AbortCode::ACCESS) {
@@ -136,29 +149,27 @@ impl Walk<'_> {
                 }
             }
         }
-        let Some(code) = first else { return wanted };
+        // There is at least the wanted one.
+        first.map_or(Ok(self.pdo.transmission), Err)
+    }
+
+    /// The type that the device has and keeps, where it does.
+    fn kept_type(&mut self, code: AbortCode) -> TransmissionType {
+        let (object, wanted) = (self.parameter(SUB_TYPE), self.pdo.transmission);
         let strict = self.pdo.policy == MappingPolicy::Exact && self.pdo.others.is_empty();
         let exists = self.description.look_up(object).is_ok();
         let found = self.number(object).and_then(|word| u8::try_from(word).ok()).map(TransmissionType);
-        let receives = |kind: TransmissionType| {
-            self.direction == Direction::Receive && kind.is_synchronous() && !kind.is_remote()
-        };
-        let does = |found: TransmissionType| {
-            found == wanted
-                || !self.pdo.others.is_empty()
-                    && all().any(|kind| kind == found || receives(kind) && receives(found))
-        };
         match found {
             // The file does not say what it has.
             None if exists && !strict => wanted,
-            Some(found) if !strict && does(found) => {
+            Some(found) if !strict && self.does(found) => {
                 if found != wanted {
                     self.other_type(found);
                 }
                 found
             }
             _ => {
-                let kinds: Vec<_> = all().map(|kind| kind.0.to_string()).collect();
+                let kinds: Vec<_> = types(self.pdo).map(|kind| kind.0.to_string()).collect();
                 let has = found.map_or_else(String::new, |found| format!(", and it has {}", found.0));
                 let text = format!(
                     "{} cannot have the transmission type {}: {object}: {code}{has}",
@@ -169,6 +180,15 @@ impl Walk<'_> {
                 wanted
             }
         }
+    }
+
+    /// Whether a type does as well as one of those of the PDO.
+    fn does(&self, found: TransmissionType) -> bool {
+        let receives = |kind: TransmissionType| {
+            self.direction == Direction::Receive && kind.is_synchronous() && !kind.is_remote()
+        };
+        let as_well = |kind| kind == found || receives(kind) && receives(found);
+        found == self.pdo.transmission || !self.pdo.others.is_empty() && types(self.pdo).any(as_well)
     }
 
     fn other_type(&mut self, kind: TransmissionType) {

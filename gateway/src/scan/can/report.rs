@@ -49,33 +49,7 @@ pub fn text(bus: &Bus) -> String {
         let _ = writeln!(out, "\nno node answers by CANopen; drives on DeviceNet would not");
     }
     for device in &bus.nodes {
-        let _ = writeln!(out, "\nnode {}: {}", device.node, title(device));
-        let mut line = |what: &str, value: &str| {
-            let _ = writeln!(out, "  {what:<14} {value}");
-        };
-        if let Some(number) = device.number(DEVICE_TYPE) {
-            line("device type", &format!("{number:#010x}{}", profile(number)));
-        }
-        for (what, object) in NUMBERS.into_iter().zip(IDENTITY) {
-            if let Some(number) = device.number(object) {
-                line(what, &both(number));
-            }
-        }
-        for (what, object) in [("hardware", HARDWARE), ("software", SOFTWARE)] {
-            if let Some(text) = device.text(object) {
-                line(what, &text);
-            }
-        }
-        for (axis, modes) in device.axes() {
-            line(&format!("modes, axis {axis}"), &names(modes).join(" "));
-        }
-        for answer in &device.answers {
-            if let Err(failure) = &answer.data
-                && !failure.is_absent()
-            {
-                line("not read", &format!("{}: {failure}", answer.object));
-            }
-        }
+        lines(&mut out, device);
     }
     for address in &bus.unassigned {
         let _ = writeln!(out, "\nwithout a node-id: its LSS address");
@@ -84,6 +58,37 @@ pub fn text(bus: &Bus) -> String {
         }
     }
     out
+}
+
+/// A device, line by line.
+fn lines(out: &mut String, device: &Found) {
+    let _ = writeln!(out, "\nnode {}: {}", device.node, title(device));
+    let mut line = |what: &str, value: &str| {
+        let _ = writeln!(out, "  {what:<14} {value}");
+    };
+    if let Some(number) = device.number(DEVICE_TYPE) {
+        line("device type", &format!("{number:#010x}{}", profile(number)));
+    }
+    for (what, object) in NUMBERS.into_iter().zip(IDENTITY) {
+        if let Some(number) = device.number(object) {
+            line(what, &both(number));
+        }
+    }
+    for (what, object) in [("hardware", HARDWARE), ("software", SOFTWARE)] {
+        if let Some(text) = device.text(object) {
+            line(what, &text);
+        }
+    }
+    for (axis, modes) in device.axes() {
+        line(&format!("modes, axis {axis}"), &names(modes).join(" "));
+    }
+    for answer in &device.answers {
+        if let Err(failure) = &answer.data
+            && !failure.is_absent()
+        {
+            line("not read", &format!("{}: {failure}", answer.object));
+        }
+    }
 }
 
 /// The findings as one JSON object.

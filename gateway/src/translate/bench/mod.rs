@@ -568,14 +568,7 @@ impl Bench {
     ) -> Vec<Told> {
         self.used = true;
         if !update.is_valid() {
-            // As a connection begins; its updates go on as those of the bench.
-            if self.controllers[device].commands {
-                let request = self.controllers[device].close();
-                self.request(device, request);
-                self.settle();
-                self.open(device);
-                self.settle();
-            }
+            self.reconnect(device);
             return Vec::new();
         }
         let controller = &mut self.controllers[device];
@@ -603,39 +596,38 @@ impl Bench {
             self.run_for(device, 1);
             return Vec::new();
         }
-        let controller = &self.controllers[device];
-        let (counts, last) =
-            (sent + controller.period + self.lead, sent + controller.period * TELEGRAM_PERIODS_MAX);
+        self.telegrams(device, &axes, sent)
+    }
+
+    /// As a connection begins; its updates go on as those of the bench.
+    fn reconnect(&mut self, device: usize) {
+        if self.controllers[device].commands {
+            let request = self.controllers[device].close();
+            self.request(device, request);
+            self.settle();
+            self.open(device);
+            self.settle();
+        }
+    }
+
+    /// What axes are told from an update on, until each has had the telegram of the instant at which the update counts.
+    fn telegrams(&mut self, device: usize, axes: &[usize], sent: MonotonicTime) -> Vec<Told> {
+        let period = self.controllers[device].period;
+        let (counts, last) = (sent + period + self.lead, sent + period * TELEGRAM_PERIODS_MAX);
         let mut told: Vec<Told> = Vec::with_capacity(axes.len());
         let mut words: Vec<Option<Vec<u8>>> = Vec::with_capacity(axes.len());
-        for axis in &axes {
+        for axis in axes {
             let peer = &self.taps[self.members[*axis].bus].peers()[*axis];
             words.push(peer.told.as_ref().map(|(_, bytes)| head(bytes)));
             told.push(Told { before: Vec::new(), last: None, command: AxisCommand::default() });
         }
         while told.iter().any(|told| told.last.is_none()) && self.now < last {
             self.call();
-            for ((told, words), axis) in told.iter_mut().zip(&mut words).zip(&axes) {
-                let peer = &self.taps[self.members[*axis].bus].peers()[*axis];
-                let Some((at, bytes)) = peer.told.as_ref().filter(|(at, _)| *at >= sent) else { continue };
-                let channel = &self.engine.axes()[*axis];
-                let telegram = || Telegram {
-                    bytes: bytes.clone(),
-                    command: *channel.command(),
-                    action: channel.action(),
-                    shown: peer.shown.clone(),
-                };
-                if told.last.is_some() {
-                } else if *at >= counts {
-                    told.command = *channel.command();
-                    told.last = Some(telegram());
-                } else if words.as_ref().is_none_or(|words| *words != head(bytes)) {
-                    *words = Some(head(bytes));
-                    told.before.push(telegram());
-                }
+            for ((told, words), axis) in told.iter_mut().zip(&mut words).zip(axes) {
+                self.note_told(*axis, (sent, counts), told, words);
             }
         }
-        for (told, axis) in told.iter_mut().zip(&axes).filter(|(told, _)| told.last.is_none()) {
+        for (told, axis) in told.iter_mut().zip(axes).filter(|(told, _)| told.last.is_none()) {
             told.command = *self.engine.axes()[*axis].command();
         }
         for told in &mut told {
@@ -644,6 +636,35 @@ impl Bench {
             told.before.retain(|before| Some(head(&before.bytes)) != last);
         }
         told
+    }
+
+    /// Notes the newest telegram of an axis: the first one from `counts` on, or one before it with other words than the last.
+    fn note_told(
+        &mut self,
+        axis: usize,
+        (sent, counts): (MonotonicTime, MonotonicTime),
+        told: &mut Told,
+        words: &mut Option<Vec<u8>>,
+    ) {
+        let peer = &self.taps[self.members[axis].bus].peers()[axis];
+        let Some((at, bytes)) = peer.told.as_ref().filter(|(at, _)| *at >= sent) else { return };
+        if told.last.is_some() {
+            return;
+        }
+        let channel = &self.engine.axes()[axis];
+        let telegram = || Telegram {
+            bytes: bytes.clone(),
+            command: *channel.command(),
+            action: channel.action(),
+            shown: peer.shown.clone(),
+        };
+        if *at >= counts {
+            told.command = *channel.command();
+            told.last = Some(telegram());
+        } else if words.as_ref().is_none_or(|words| *words != head(bytes)) {
+            *words = Some(head(bytes));
+            told.before.push(telegram());
+        }
     }
 
     /// What the drive of an axis shows.

@@ -9,7 +9,10 @@ use super::{Reporter, is_standard, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
 use crate::finding::registry::{DIRECTION, WRONG_BINDING, WRONG_STATE, WRONG_WRAP};
-use crate::format::{FieldIs, FieldValueRow, Name};
+use crate::format::{
+    CipAttributeRow, CipEventRow, FieldIs, FieldValueRow, ModeSlotRow, Name, ProcedureRow, SercosCaptureRow,
+    SercosStatusRow, StatusRow,
+};
 
 /// Which of the places of a binding.
 type Places = fn(&Binding) -> &'static [&'static str];
@@ -170,143 +173,170 @@ pub(super) fn cip_names(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().cip_generic;
     let mut reporter = Reporter { source: &file.text, findings };
     for row in &file.rows.attribute {
-        let attribute = row.attribute.get_ref();
-        let Some((_, right)) = ATTRIBUTES.iter().find(|(known, _)| known == attribute) else { continue };
-        for (key, bound) in [("parameter", &row.parameter), ("signal", &row.signal)] {
-            let Some(bound) = bound.as_ref().filter(|bound| bound.get_ref() != right) else { continue };
-            // What a vendor defines may stand for anything.
-            if ATTRIBUTES.iter().any(|(_, known)| known == bound.get_ref()) {
-                let what = [
-                    format!("`{attribute}` is bound to `{}`", bound.get_ref()),
-                    format!("expected `{right}`"),
-                    format!("write `{key} = \"{right}\"`"),
-                ];
-                reporter.report(WRONG_BINDING, (key, bound.span()), what);
-            }
-        }
+        attribute(&mut reporter, row);
     }
     for row in &file.rows.event {
-        let event = row.event.get_ref();
-        let Some((_, checking, trigger)) = EVENTS.iter().find(|(known, ..)| known == event) else { continue };
-        let mut keys = vec![("checking", Some(&row.checking), *checking)];
-        match trigger {
-            Trigger::Capture(capture, edge) => {
-                keys.push(("capture", row.capture.as_ref(), capture));
-                keys.push(("edge", row.edge.as_ref(), edge));
-            }
-            Trigger::Signal(signal) => keys.push(("signal", row.signal.as_ref(), signal)),
-        }
-        for (key, given, right) in keys {
-            let shown = given.map_or("nothing", |name| name.get_ref().as_str());
-            if shown == right {
-                continue;
-            }
-            let what = [
-                format!("the event `{event}` would come by `{key}` = `{shown}`"),
-                format!("expected `{right}`"),
-                format!("write `{key} = \"{right}\"`"),
-            ];
-            reporter.report(WRONG_BINDING, place_of(key, given, ("event", &row.event)), what);
-        }
+        event(&mut reporter, row);
     }
     for row in &file.rows.status {
-        let [status] = row.status.as_slice() else { continue };
-        let mode = row.mode.as_ref().map(|mode| mode.get_ref().as_str());
-        let bit = row.axis_status.get_ref();
-        let ways = || AXIS_STATUS.iter().filter(|(known, ..)| known == bit);
-        if ways().next().is_none() || ways().any(|(_, one, of)| one == status.get_ref() && *of == mode) {
-            continue;
-        }
-        let right: Vec<String> = ways()
-            .map(|(_, one, of)| {
-                format!("`{one}`{}", of.map(|of| format!(" in the mode `{of}`")).unwrap_or_default())
-            })
-            .collect();
-        let what = [
-            format!("`{bit}` would be set by `{}`", status.get_ref()),
-            format!("expected {}", right.join(" or ")),
-            "correct `status`, `mode` or `axis_status`".to_owned(),
-        ];
-        reporter.report(WRONG_STATE, ("axis_status", row.axis_status.span()), what);
+        axis_status(&mut reporter, row);
     }
 }
 
-/// Procedures, slots of modes, and edges that a SERCOS drive captures.
+fn attribute(reporter: &mut Reporter<'_>, row: &CipAttributeRow) {
+    let attribute = row.attribute.get_ref();
+    let Some((_, right)) = ATTRIBUTES.iter().find(|(known, _)| known == attribute) else { return };
+    for (key, bound) in [("parameter", &row.parameter), ("signal", &row.signal)] {
+        let Some(bound) = bound.as_ref().filter(|bound| bound.get_ref() != right) else { continue };
+        // What a vendor defines may stand for anything.
+        if ATTRIBUTES.iter().any(|(_, known)| known == bound.get_ref()) {
+            let what = [
+                format!("`{attribute}` is bound to `{}`", bound.get_ref()),
+                format!("expected `{right}`"),
+                format!("write `{key} = \"{right}\"`"),
+            ];
+            reporter.report(WRONG_BINDING, (key, bound.span()), what);
+        }
+    }
+}
+
+/// Who looks for an event, and what brings it.
+fn event(reporter: &mut Reporter<'_>, row: &CipEventRow) {
+    let event = row.event.get_ref();
+    let Some((_, checking, trigger)) = EVENTS.iter().find(|(known, ..)| known == event) else { return };
+    let mut keys = vec![("checking", Some(&row.checking), *checking)];
+    match trigger {
+        Trigger::Capture(capture, edge) => {
+            keys.push(("capture", row.capture.as_ref(), capture));
+            keys.push(("edge", row.edge.as_ref(), edge));
+        }
+        Trigger::Signal(signal) => keys.push(("signal", row.signal.as_ref(), signal)),
+    }
+    for (key, given, right) in keys {
+        let shown = given.map_or("nothing", |name| name.get_ref().as_str());
+        if shown == right {
+            continue;
+        }
+        let what = [
+            format!("the event `{event}` would come by `{key}` = `{shown}`"),
+            format!("expected `{right}`"),
+            format!("write `{key} = \"{right}\"`"),
+        ];
+        reporter.report(WRONG_BINDING, place_of(key, given, ("event", &row.event)), what);
+    }
+}
+
+/// What sets a bit of Axis Status, in which mode.
+fn axis_status(reporter: &mut Reporter<'_>, row: &StatusRow) {
+    let [status] = row.status.as_slice() else { return };
+    let mode = row.mode.as_ref().map(|mode| mode.get_ref().as_str());
+    let bit = row.axis_status.get_ref();
+    let facts = || AXIS_STATUS.iter().filter(|(known, ..)| known == bit);
+    if facts().next().is_none() || facts().any(|(_, one, of)| one == status.get_ref() && *of == mode) {
+        return;
+    }
+    let shown = |one: &str, of: Option<&str>| match of {
+        Some(of) => format!("`{one}` in the mode `{of}`"),
+        None => format!("`{one}`"),
+    };
+    let right: Vec<String> = facts().map(|(_, one, of)| shown(one, *of)).collect();
+    let what = [
+        format!("`{bit}` would be set by `{}`", status.get_ref()),
+        format!("expected {}", right.join(" or ")),
+        "correct `status`, `mode` or `axis_status`".to_owned(),
+    ];
+    reporter.report(WRONG_STATE, ("axis_status", row.axis_status.span()), what);
+}
+
+/// Procedures, slots of modes, edges that a SERCOS drive captures, and bits of its status.
 pub(super) fn sercos_places(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_sercos;
     let rows = &file.rows;
     let mut reporter = Reporter { source: &file.text, findings };
     for row in &rows.procedure {
-        let of_row = |(mode, source, _): &&(&str, &str, &[&str])| {
-            row.mode.get_ref() == mode && row.interpolation.get_ref() == source
-        };
-        let Some((mode, source, right)) = PROCEDURES.iter().find(of_row) else { continue };
-        let given: Vec<&str> = row.commands.iter().map(|name| name.get_ref().as_str()).collect();
-        if given != *right && given.iter().all(|idn| is_standard(idn)) {
-            let listed: Vec<String> = right.iter().map(|idn| format!("\"{idn}\"")).collect();
-            let what = [
-                format!("the mode `{mode}` by the {source} executes other procedure commands"),
-                format!("expected {}, in this order", right.join(", ")),
-                format!("write `commands = [{}]`", listed.join(", ")),
-            ];
-            reporter.report(WRONG_BINDING, ("mode", row.mode.span()), what);
-        }
+        procedure(&mut reporter, row);
     }
     for row in &rows.mode_slot {
-        let slot = usize::try_from(*row.slot.get_ref()).ok();
-        let right = slot.and_then(|slot| MODE_SLOTS.get(slot));
-        let Some(right) = right.filter(|right| row.idn.get_ref() != *right) else { continue };
-        let what = [
-            format!(
-                "the mode in {} would be chosen as that of slot {}",
-                row.idn.get_ref(),
-                row.slot.get_ref()
-            ),
-            format!("the drive has the mode of this slot in {right}"),
-            format!("write `idn = \"{right}\"`"),
-        ];
-        reporter.report(WRONG_BINDING, ("slot", row.slot.span()), what);
+        mode_slot(&mut reporter, row);
     }
     for row in &rows.capture {
         captured(&mut reporter, SERCOS_CAPTURES, (&row.capture, &row.edge), &row.pattern, row.value.as_ref());
-        let Some((_, enable)) = SERCOS_PROBES.iter().find(|(known, _)| known == row.capture.get_ref()) else {
-            continue;
-        };
-        for (key, given, right) in
-            [("enable", row.enable.as_ref(), *enable), ("command", row.command.as_ref(), SERCOS_PROBING)]
-        {
-            let Some(given) = given.filter(|given| given.get_ref() != right && is_standard(given.get_ref()))
-            else {
-                continue;
-            };
-            let what = [
-                format!("`{}` would be armed by {}", row.capture.get_ref(), given.get_ref()),
-                format!("{right} lets its edges through"),
-                format!("write `{key} = \"{right}\"`"),
-            ];
-            reporter.report(WRONG_BINDING, (key, given.span()), what);
-        }
+        sercos_probe(&mut reporter, row);
     }
     for row in &rows.parameter {
         direction(&mut reporter, &row.parameter, &row.idn, &row.direction);
     }
-    let status = |word: &str, pattern: &[FieldValueRow]| {
-        let [field] = pattern else { return None };
-        SERCOS_STATUS.iter().find(|(known, name, _)| *known == word && name == field.field.get_ref())
-    };
     for row in &rows.status {
-        let Some((word, field, right)) = status(row.word.get_ref(), &row.pattern) else { continue };
-        let set = row.pattern.iter().all(|field| matches!(field.is.get_ref(), FieldIs::Number(1)));
-        if row.status.get_ref() == right && set {
-            continue;
-        }
-        let what = [
-            format!("`{}` is taken from another bit of `{word}`", row.status.get_ref()),
-            format!("`{field}` = 1 shows `{right}`"),
-            format!("write `status = \"{right}\"`, or correct the field"),
-        ];
-        reporter.report(WRONG_STATE, ("status", row.status.span()), what);
+        sercos_status(&mut reporter, row);
     }
+}
+
+/// The procedure commands of a mode, in their order.
+fn procedure(reporter: &mut Reporter<'_>, row: &ProcedureRow) {
+    let of_row = |(mode, source, _): &&(&str, &str, &[&str])| {
+        row.mode.get_ref() == mode && row.interpolation.get_ref() == source
+    };
+    let Some((mode, source, right)) = PROCEDURES.iter().find(of_row) else { return };
+    let given: Vec<&str> = row.commands.iter().map(|name| name.get_ref().as_str()).collect();
+    if given == *right || !given.iter().all(|idn| is_standard(idn)) {
+        return;
+    }
+    let listed: Vec<String> = right.iter().map(|idn| format!("\"{idn}\"")).collect();
+    let what = [
+        format!("the mode `{mode}` by the {source} executes other procedure commands"),
+        format!("expected {}, in this order", right.join(", ")),
+        format!("write `commands = [{}]`", listed.join(", ")),
+    ];
+    reporter.report(WRONG_BINDING, ("mode", row.mode.span()), what);
+}
+
+/// The IDN in which the drive keeps the mode of a slot.
+fn mode_slot(reporter: &mut Reporter<'_>, row: &ModeSlotRow) {
+    let slot = usize::try_from(*row.slot.get_ref()).ok();
+    let right = slot.and_then(|slot| MODE_SLOTS.get(slot));
+    let Some(right) = right.filter(|right| row.idn.get_ref() != *right) else { return };
+    let what = [
+        format!("the mode in {} would be chosen as that of slot {}", row.idn.get_ref(), row.slot.get_ref()),
+        format!("the drive has the mode of this slot in {right}"),
+        format!("write `idn = \"{right}\"`"),
+    ];
+    reporter.report(WRONG_BINDING, ("slot", row.slot.span()), what);
+}
+
+/// What arms the probe of a capture: its enable, and the procedure command of both.
+fn sercos_probe(reporter: &mut Reporter<'_>, row: &SercosCaptureRow) {
+    let probe = SERCOS_PROBES.iter().find(|(known, _)| known == row.capture.get_ref());
+    let Some((_, enable)) = probe else { return };
+    for (key, given, right) in
+        [("enable", row.enable.as_ref(), *enable), ("command", row.command.as_ref(), SERCOS_PROBING)]
+    {
+        let other = |given: &&Name| given.get_ref() != right && is_standard(given.get_ref());
+        let Some(given) = given.filter(other) else { continue };
+        let what = [
+            format!("`{}` would be armed by {}", row.capture.get_ref(), given.get_ref()),
+            format!("{right} lets its edges through"),
+            format!("write `{key} = \"{right}\"`"),
+        ];
+        reporter.report(WRONG_BINDING, (key, given.span()), what);
+    }
+}
+
+/// What a bit of a status word shows.
+fn sercos_status(reporter: &mut Reporter<'_>, row: &SercosStatusRow) {
+    let [field] = row.pattern.as_slice() else { return };
+    let of_row =
+        |(word, name, _): &&(&str, &str, &str)| word == row.word.get_ref() && name == field.field.get_ref();
+    let Some((word, name, right)) = SERCOS_STATUS.iter().find(of_row) else { return };
+    let set = matches!(field.is.get_ref(), FieldIs::Number(1));
+    if row.status.get_ref() == right && set {
+        return;
+    }
+    let what = [
+        format!("`{}` is taken from another bit of `{word}`", row.status.get_ref()),
+        format!("`{name}` = 1 shows `{right}`"),
+        format!("write `status = \"{right}\"`, or correct the field"),
+    ];
+    reporter.report(WRONG_STATE, ("status", row.status.span()), what);
 }
 
 /// Edges that a CiA 402 drive captures.

@@ -10,6 +10,7 @@ use crate::Mapping;
 use crate::cia402::{StatusRule, Tells};
 use crate::finding::Findings;
 use crate::finding::registry::{WRONG_ORDER, WRONG_STATE};
+use crate::format::Cia402StatusRow;
 
 /// The states of the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,6 +174,15 @@ struct Case {
     tells: Tells,
 }
 
+impl Case {
+    /// Whether a rule takes its status bit in this case.
+    fn fits(&self, rule: &StatusRule) -> bool {
+        rule.pattern.matches(self.word)
+            && (rule.modes.is_empty() || rule.modes.contains(&self.mode))
+            && rule.drives.include(self.tells)
+    }
+}
+
 /// A status bit of 6041h: what shows it, in words, and whether a case does; `None` where the profile leaves it open.
 type Shown = (&'static str, &'static str, fn(Case) -> Option<bool>);
 
@@ -215,44 +225,52 @@ const INPUTS: &[(&str, u32)] =
     &[("negative_limit_switch", 1 << 0), ("positive_limit_switch", 1 << 1), ("home_switch", 1 << 2)];
 
 fn status(mapping: &Mapping, reporter: &mut Reporter<'_>) {
-    let rows = &mapping.tables().generic_cia402.rows;
-    let rules = || mapping.cia402.status.iter().zip(&rows.status);
-    for (rule, row) in rules() {
-        let name = row.status.get_ref().as_str();
-        let input = INPUTS.iter().find(|(known, _)| rule.object.index == 0x60FD && *known == name);
-        let Some((_, bit)) = input.filter(|(_, bit)| rule.pattern != BitPattern::new(*bit, *bit)) else {
-            continue;
-        };
+    let rows = &mapping.tables().generic_cia402.rows.status;
+    for (rule, row) in mapping.cia402.status.iter().zip(rows) {
+        input(rule, row, reporter);
+    }
+    let cases = cases();
+    for shown in STATUS {
+        status_bit(mapping, shown, &cases, reporter);
+    }
+}
+
+/// A switch is taken from its bit of 60FDh.
+fn input(rule: &StatusRule, row: &Cia402StatusRow, reporter: &mut Reporter<'_>) {
+    let name = row.status.get_ref().as_str();
+    let input = INPUTS.iter().find(|(known, _)| rule.object.index == 0x60FD && *known == name);
+    let other = input.filter(|(_, bit)| rule.pattern != BitPattern::new(*bit, *bit));
+    if let Some((_, bit)) = other {
         let wanted = format!("bit {} of 60FDh", bit.trailing_zeros());
         taken(reporter, name, &wanted, row.status.span());
     }
-    let cases = cases();
-    for (name, why, shows) in STATUS {
-        let own: Vec<_> = rules()
-            .filter(|(rule, row)| rule.object == mapping.cia402.words.status && row.status.get_ref() == name)
-            .collect();
-        let fits = |rule: &StatusRule, case: &Case| {
-            rule.pattern.matches(case.word)
-                && (rule.modes.is_empty() || rule.modes.contains(&case.mode))
-                && rule.drives.include(case.tells)
-        };
-        let mut wrong = false;
-        for (rule, row) in &own {
-            if cases.iter().any(|case| shows(*case) == Some(false) && fits(rule, case)) {
-                wrong = true;
-                taken(reporter, name, why, row.status.span());
-            }
+}
+
+/// A status bit is taken from 6041h in every case that shows it, and in no other.
+fn status_bit(mapping: &Mapping, (name, why, shows): &Shown, cases: &[Case], reporter: &mut Reporter<'_>) {
+    let rows = &mapping.tables().generic_cia402.rows;
+    let own: Vec<_> = mapping
+        .cia402
+        .status
+        .iter()
+        .zip(&rows.status)
+        .filter(|(rule, row)| rule.object == mapping.cia402.words.status && row.status.get_ref() == name)
+        .collect();
+    let mut wrong = false;
+    for (rule, row) in &own {
+        if cases.iter().any(|case| shows(*case) == Some(false) && case.fits(rule)) {
+            wrong = true;
+            taken(reporter, name, why, row.status.span());
         }
-        let missed =
-            |case: &&Case| shows(**case) == Some(true) && !own.iter().any(|(rule, _)| fits(rule, case));
-        if let Some(case) = cases.iter().find(missed).filter(|_| !wrong) {
-            let what = [
-                format!("no row takes `{name}` from 6041h = {:04X} in mode {}", case.word, case.mode),
-                format!("the drive shows it by {why}"),
-                format!("add a [[status]] row of 6041h, with `status = \"{name}\"`"),
-            ];
-            reporter.report(WRONG_STATE, ("status", rows.words.status.span()), what);
-        }
+    }
+    let missed = |case: &&Case| shows(**case) == Some(true) && !own.iter().any(|(rule, _)| case.fits(rule));
+    if let Some(case) = cases.iter().find(missed).filter(|_| !wrong) {
+        let what = [
+            format!("no row takes `{name}` from 6041h = {:04X} in mode {}", case.word, case.mode),
+            format!("the drive shows it by {why}"),
+            format!("add a [[status]] row of 6041h, with `status = \"{name}\"`"),
+        ];
+        reporter.report(WRONG_STATE, ("status", rows.words.status.span()), what);
     }
 }
 

@@ -36,7 +36,7 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     bindings::cip_names(mapping, findings);
     bindings::sercos_places(mapping, findings);
     access::sercos(mapping, findings);
-    scales::sercos(mapping, findings);
+    scales::sercos::check(mapping, findings);
     scales::cip(mapping, findings);
     sercos_words::check(mapping, findings);
     causes::sercos(mapping, findings);
@@ -49,9 +49,9 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     controller::check(mapping, findings);
     // What nobody binds may follow from what is bound to the wrong place. A family has what its drives have, and says no reasons.
     if !findings.has_errors() {
-        gaps::sercos(mapping, findings);
-        gaps::cip(mapping, findings);
-        gaps::cia402(mapping, findings);
+        gaps::sercos::check(mapping, findings);
+        gaps::cip::check(mapping, findings);
+        gaps::cia402::check(mapping, findings);
     }
 }
 

@@ -23,9 +23,9 @@ use crate::drive_rows::{
 use crate::finding::registry as code;
 use crate::finding::{Findings, Spanned};
 use crate::format::{
-    CommissionRow, DiagnosisRow, FieldIs, FieldValueRow, GenericSercosFile, LoadSignalRow, Name, PolarityRow,
-    ProcedureRow, ScalingMethodRow, SercosCaptureRow, SercosFaultRow, SercosModeRow, SercosParameterRow,
-    SercosScalingRow, SercosSignalRow, UnboundRow,
+    CommissionRow, DiagnosisRow, FieldIs, FieldValueRow, GenericSercosFile, LoadSignalRow, ModeSlotRow, Name,
+    PolarityRow, ProcedureRow, ScalingMethodRow, SercosCaptureRow, SercosFaultRow, SercosModeRow,
+    SercosParameterRow, SercosScalingRow, SercosSignalRow, UnboundRow, WordsRow,
 };
 use crate::generic_names::{
     action, capture_kind, cause_and_reaction, interpolation, operating_mode, report, status_bit, unit_kind,
@@ -400,6 +400,7 @@ impl<'a> Builder<'a> {
         self.tables.procedures.push(ProcedureRule { selection, led_in, commands });
     }
 
+    /// Control and status word, and the rows that set and read their fields.
     fn words(&mut self, rows: &GenericSercosFile) {
         let control = self.idn("control", &rows.words.control).map(|row| row.idn);
         let status = self.idn("status", &rows.words.status).map(|row| row.idn);
@@ -412,15 +413,25 @@ impl<'a> Builder<'a> {
             return self.resolver.error(code::ROW_MISSING, rows.words.control.span(), "control", message);
         };
         for row in &rows.mode_slot {
-            let is = || Spanned::new(row.slot.span(), FieldIs::Number(*row.slot.get_ref()));
-            let value = |field: &Name| [FieldValueRow { field: field.clone(), is: is() }];
-            let control = self.pattern(control, &value(&rows.words.mode_control));
-            let status = self.pattern(status, &value(&rows.words.mode_status));
-            let idn = self.idn("idn", &row.idn);
-            if let (Some(control), Some(status), Some(idn)) = (control, status, idn) {
-                self.tables.slots.push(SlotRule { control, status, idn: idn.idn });
-            }
+            self.mode_slot(&rows.words, row, (control, status));
         }
+        self.actions(rows, control);
+        self.reports(rows, status);
+        self.status(rows);
+    }
+
+    fn mode_slot(&mut self, words: &WordsRow, row: &ModeSlotRow, (control, status): (&Word, &Word)) {
+        let is = || Spanned::new(row.slot.span(), FieldIs::Number(*row.slot.get_ref()));
+        let value = |field: &Name| [FieldValueRow { field: field.clone(), is: is() }];
+        let control = self.pattern(control, &value(&words.mode_control));
+        let status = self.pattern(status, &value(&words.mode_status));
+        let idn = self.idn("idn", &row.idn);
+        if let (Some(control), Some(status), Some(idn)) = (control, status, idn) {
+            self.tables.slots.push(SlotRule { control, status, idn: idn.idn });
+        }
+    }
+
+    fn actions(&mut self, rows: &GenericSercosFile, control: &Word) {
         for row in &rows.action {
             let action = action(&mut self.resolver, &row.action);
             let sent = match &row.send {
@@ -429,18 +440,7 @@ impl<'a> Builder<'a> {
             };
             let pattern = self.pattern(control, &row.pattern);
             let pattern = sent.zip(pattern).map(|(sent, pattern)| over(pattern, sent));
-            let command = match &row.command {
-                None => None,
-                Some(name) => match self.idn("command", name) {
-                    Some(idn) if idn.command => Some(idn.idn),
-                    Some(idn) => {
-                        let message = format!("expected a procedure command, {} is not one", idn.idn);
-                        self.resolver.error(code::NOT_A_COMMAND, name.span(), "command", message);
-                        None
-                    }
-                    None => None,
-                },
-            };
+            let command = row.command.as_ref().and_then(|name| self.procedure_command("command", name));
             if let (Some(action), Some(pattern)) = (action, pattern) {
                 self.tables.actions.push((action, pattern));
                 self.tables.commands.extend(command.map(|idn| (action, idn)));
@@ -451,6 +451,20 @@ impl<'a> Builder<'a> {
         every_action(&mut self.resolver, &rows.mapping, has, |action| {
             format!("expected a row for action {action}, got none")
         });
+    }
+
+    /// The IDN of a procedure command; `None` with an error if it is another one.
+    fn procedure_command(&mut self, key: &str, name: &Name) -> Option<Idn> {
+        let idn = self.idn(key, name)?;
+        if !idn.command {
+            let message = format!("expected a procedure command, {} is not one", idn.idn);
+            self.resolver.error(code::NOT_A_COMMAND, name.span(), key, message);
+            return None;
+        }
+        Some(idn.idn)
+    }
+
+    fn reports(&mut self, rows: &GenericSercosFile, status: &Word) {
         for row in &rows.report {
             let report = report(&mut self.resolver, &row.report);
             if let (Some(pattern), Some(report)) = (self.pattern(status, &row.pattern), report) {
@@ -463,6 +477,10 @@ impl<'a> Builder<'a> {
                 format!("expected at most {MAX_STATE_ROWS} rows, got {}", self.tables.reports.len());
             self.resolver.error(code::TOO_MANY, rows.mapping.span(), "report", message);
         }
+    }
+
+    /// Status bits, each from a word of its own choice.
+    fn status(&mut self, rows: &GenericSercosFile) {
         for row in &rows.status {
             let bit = status_bit(&mut self.resolver, &row.status);
             let Some((idn, word)) = self.word("word", &row.word) else { continue };

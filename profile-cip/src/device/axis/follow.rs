@@ -36,19 +36,7 @@ impl Axis {
             self.look_at_conditions(actions, context.system_time);
         }
         if self.machine.state == AxisState::Initializing {
-            let reset = self.follow_connection_reset();
-            let configured =
-                self.command.block.control_status.contains(ControlStatus::CONFIGURATION_COMPLETE);
-            // A drive that is lost is a fault that stands: the controller learns of it, and goes on with the other axes.
-            let lost =
-                !self.drive.online && self.drive.conditions.as_slice().iter().any(DriveCondition::stops);
-            let ready = context.connected && configured && (lost || self.drive.online && reset);
-            if ready && !context.node_fault && !self.machine.winding_down {
-                self.orders.connection_reset = false;
-                self.follow_control_mode();
-                self.fire(AxisEvent::InitializationComplete);
-            }
-            return;
+            return self.follow_configuration(context);
         }
         self.follow_reset(context);
         self.follow_control_mode();
@@ -67,6 +55,20 @@ impl Axis {
         // First, because the drive leaves its test in the same cycle in which it reports the end.
         self.follow_test(context);
         self.follow_drive(context);
+    }
+
+    /// Ends the initialization once the axis is configured and its drive has reset its faults.
+    fn follow_configuration(&mut self, context: &Context) {
+        let reset = self.follow_connection_reset();
+        let configured = self.command.block.control_status.contains(ControlStatus::CONFIGURATION_COMPLETE);
+        // A drive that is lost is a fault that stands: the controller learns of it, and goes on with the other axes.
+        let lost = !self.drive.online && self.drive.conditions.as_slice().iter().any(DriveCondition::stops);
+        let ready = context.connected && configured && (lost || self.drive.online && reset);
+        if ready && !context.node_fault && !self.machine.winding_down {
+            self.orders.connection_reset = false;
+            self.follow_control_mode();
+            self.fire(AxisEvent::InitializationComplete);
+        }
     }
 
     /// The drive is gone, and no condition of it says so.

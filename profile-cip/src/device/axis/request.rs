@@ -222,19 +222,11 @@ impl Axis {
         let Some(order) = test::order(test, request, source) else {
             return GeneralStatus::INVALID_PARAMETER;
         };
-        let standby = matches!(
-            self.machine.state,
-            AxisState::Stopped | AxisState::Shutdown | AxisState::PreCharge | AxisState::StartInhibited
-        );
-        let state = if test.is_active() { self.machine.state == AxisState::Stopped } else { standby };
-        if !state || self.test.is_in_process() || self.requests.handshake.executing().is_some() {
+        if !self.is_free_for(test) {
             return GeneralStatus::OBJECT_STATE_CONFLICT;
         }
-        // With load feedback the motor would move although channel 2 cannot be judged.
-        let judged = !matches!(source, FeedbackSource::LOAD | FeedbackSource::DUAL);
-        let may_move = judged && !self.inhibited() && self.drive.bus_up;
         let allowed = context.connected && context.remote && !context.node_fault && self.drive.online;
-        if !allowed || (test.is_active() && !may_move) {
+        if !allowed || (test.is_active() && !self.may_move_for_test(source)) {
             return GeneralStatus::DEVICE_STATE_CONFLICT;
         }
         if test.is_active() && !self.fire(AxisEvent::Test) {
@@ -243,6 +235,22 @@ impl Axis {
         self.test.begin(order);
         self.update_action();
         GeneralStatus::SUCCESS
+    }
+
+    /// Whether a test can begin in the present state: no other one is in process, and no request.
+    fn is_free_for(&self, test: HookupTest) -> bool {
+        let state = match self.machine.state {
+            AxisState::Stopped => true,
+            AxisState::Shutdown | AxisState::PreCharge | AxisState::StartInhibited => !test.is_active(),
+            _ => false,
+        };
+        state && !self.test.is_in_process() && self.requests.handshake.executing().is_none()
+    }
+
+    /// Whether the motor may move for a test. With load feedback it would although channel 2 cannot be judged.
+    fn may_move_for_test(&self, source: FeedbackSource) -> bool {
+        let judged = !matches!(source, FeedbackSource::LOAD | FeedbackSource::DUAL);
+        judged && !self.inhibited() && self.drive.bus_up
     }
 
     /// Stop Process: the axis stops as by a Disable. Returns the status when there is nothing to wait for.

@@ -86,18 +86,21 @@ impl Control {
             return ServoControl::TorqueOff;
         }
         if !on || !cycle.connected || self.locked {
-            let stands = actual.status.contains(StatusBits::STANDSTILL);
-            self.off_for = if stands && torque { self.off_for + cycle.elapsed } else { DurationNs::ZERO };
-            let waits = torque
-                && cycle.connected
-                && !self.locked
-                && self.off_for < tenth_millis(store, Idn::DRIVE_OFF_DELAY_TIME);
+            let stands = torque && actual.status.contains(StatusBits::STANDSTILL);
+            self.off_for = if stands { self.off_for + cycle.elapsed } else { DurationNs::ZERO };
+            let waits = torque && self.is_in_off_delay(cycle, store);
             return if waits { ServoControl::Halt } else { ServoControl::Disable };
         }
         self.off_for = DurationNs::ZERO;
         let halt = !self.word.contains(DriveControl::RESTART) && !self.silent;
         let running = matches!(actual.report, Report::Operating | Report::Halted);
         if halt && running { ServoControl::Halt } else { ServoControl::Enable }
+    }
+
+    /// Whether the drive stays in halt for the drive-off delay: only for a master that it follows.
+    fn is_in_off_delay(&self, cycle: &Cycle, store: &Store) -> bool {
+        let follows = cycle.connected && !self.locked;
+        follows && self.off_for < tenth_millis(store, Idn::DRIVE_OFF_DELAY_TIME)
     }
 }
 

@@ -250,10 +250,7 @@ impl<'n> DecodeContext<'n> {
         let status = SvcStatus::from_bits_retain(slot.word);
         let Some(channel) = self.channels.get_mut(&address) else { return false };
         let Some(control) = channel.control else { return false };
-        let done = status.contains(SvcStatus::VALID)
-            && !status.contains(SvcStatus::BUSY)
-            && status.contains(SvcStatus::AHS) == control.mhs();
-        if !done || channel.answered {
+        if channel.answered || !is_answer(status, control) {
             return false;
         }
         channel.answered = true;
@@ -270,17 +267,22 @@ impl<'n> DecodeContext<'n> {
                 self.transfer(address, idn, read);
             }
         }
-        match control.element() {
+        self.learn_read(address, idn, control.element(), slot.info);
+        true
+    }
+
+    /// Takes over what a slave has answered to a read of an element.
+    fn learn_read(&mut self, address: u16, idn: Idn, element: Element, info: u32) {
+        match element {
             Element::Attribute if self.attributes.len() < ATTRIBUTES_MAX => {
-                self.attributes.insert(idn, Attribute(slot.info));
+                self.attributes.insert(idn, Attribute(info));
             }
             Element::Data if idn.block() == Idn::CONNECTION_BLOCK && idn.element() == connection::LENGTH => {
-                let len = low_word(slot.info);
+                let len = low_word(info);
                 self.connection(address, idn.instance(), |connection| connection.len = Some(len));
             }
             _ => {}
         }
-        true
     }
 
     /// Takes over a parameter which the master has written completely.
@@ -357,6 +359,13 @@ impl<'n> DecodeContext<'n> {
             Kind::At => self.layout.at_len[0] != 0,
         }
     }
+}
+
+/// Whether a slave has answered the step that the master has ordered last.
+fn is_answer(status: SvcStatus, control: SvcControl) -> bool {
+    status.contains(SvcStatus::VALID)
+        && !status.contains(SvcStatus::BUSY)
+        && status.contains(SvcStatus::AHS) == control.mhs()
 }
 
 pub(super) fn low_word(info: u32) -> u16 {

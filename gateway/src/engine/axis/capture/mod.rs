@@ -22,7 +22,7 @@ use profile_generic::quantity::Position;
 use profile_generic::time::MonotonicTime;
 
 use super::history::History;
-use crate::mapping::{CaptureProgram, Latch};
+use crate::mapping::{CAPTURES_MAX, CaptureProgram, Latch};
 
 /// Results that wait to be taken, one of each kind in a cycle.
 const RESULTS_MAX: usize = CaptureKind::COUNT;
@@ -58,6 +58,25 @@ enum Phase {
     Rising,
     Armed,
     Falling,
+}
+
+/// A fresh telegram of the drive.
+struct Sample<'t> {
+    telegram: &'t [u8],
+    /// The actual position, and when the drive captured it.
+    position: Position,
+    at: MonotonicTime,
+    /// Time of the sample before.
+    since: Option<MonotonicTime>,
+}
+
+/// A marker that a counter has shown.
+#[derive(Clone, Copy)]
+struct Marker {
+    position: Position,
+    at: MonotonicTime,
+    /// It was not the only one since the sample before.
+    several: bool,
 }
 
 /// An enable and the edges that it lets through.
@@ -99,11 +118,11 @@ pub struct CaptureUnit {
     gates: [Gate; crate::mapping::CAPTURE_WORDS_MAX],
     words: [u32; crate::mapping::CAPTURE_WORDS_MAX],
     /// The latch has shown its edge since its enable rose.
-    latched: [bool; crate::mapping::CAPTURES_MAX],
+    latched: [bool; CAPTURES_MAX],
     /// The position of the latch has to be read, and then counts.
-    unread: [bool; crate::mapping::CAPTURES_MAX],
-    counters: [Option<i64>; crate::mapping::CAPTURES_MAX],
-    inputs: [Option<bool>; crate::mapping::CAPTURES_MAX],
+    unread: [bool; CAPTURES_MAX],
+    counters: [Option<i64>; CAPTURES_MAX],
+    inputs: [Option<bool>; CAPTURES_MAX],
     /// The edge of the switch has come, the marker has not.
     awaiting: [bool; crate::mapping::CAPTURE_WORDS_MAX],
     history: History,
@@ -180,14 +199,15 @@ impl CaptureUnit {
         position: Position,
         at: MonotonicTime,
     ) {
-        let before = self.history.newest();
+        let since = self.history.newest().map(|(_, at)| at);
         self.history.push(position, at);
+        let sample = Sample { telegram, position, at, since };
         for (word, place) in self.words.iter_mut().zip(&program.words) {
             *word = place.read_word(telegram).unwrap_or(*word);
         }
         if self.rests {
             // The levels count that are there when something is wanted.
-            self.compare(program, telegram, position, at, before.map(|(_, at)| at));
+            self.compare(program, &sample);
             return;
         }
         for gate in &mut self.gates {
@@ -197,15 +217,13 @@ impl CaptureUnit {
             let latch = &program.latches[place];
             if program.words[latch.word].offset.is_some() && self.shows(latch, place) {
                 match latch.value.place.read(telegram) {
-                    Some(raw) if self.is_wanted(latch.kind) => {
-                        self.stored(latch, raw, before.map(|(_, at)| at))
-                    }
+                    Some(raw) if self.is_wanted(latch.kind) => self.stored(latch, raw, since),
                     Some(_) => {}
                     None => self.unread[place] = self.is_wanted(latch.kind),
                 }
             }
         }
-        self.compare(program, telegram, position, at, before.map(|(_, at)| at));
+        self.compare(program, &sample);
         self.watching = CaptureSet::EMPTY;
         if !self.wanted.is_empty() {
             let kinds = program.kinds();
@@ -248,44 +266,12 @@ impl CaptureUnit {
     }
 
     /// Compares counters and inputs with those of the last telegram.
-    fn compare(
-        &mut self,
-        program: &CaptureProgram,
-        telegram: &[u8],
-        position: Position,
-        at: MonotonicTime,
-        since: Option<MonotonicTime>,
-    ) {
+    fn compare(&mut self, program: &CaptureProgram, sample: &Sample<'_>) {
         if program.inputs.is_empty() && program.counters.is_empty() && program.sequences.is_empty() {
             return;
         }
-        let mut switched = [false; crate::mapping::CAPTURES_MAX];
-        for (place, input) in program.inputs.iter().enumerate() {
-            let Some(word) = input.word.read_word(telegram) else { continue };
-            let level = input.pattern.matches(word);
-            let before = self.inputs[place].replace(level);
-            switched[place] = level && before == Some(false);
-            if switched[place] && self.watching.contains(input.kind) {
-                self.give(input.kind, CaptureStatus::Captured, position, at);
-            }
-        }
-        let mut markers = [None; crate::mapping::CAPTURES_MAX];
-        for (place, counter) in program.counters.iter().enumerate() {
-            let Some(count) = counter.counter.read(telegram) else { continue };
-            let Some(last) = self.counters[place].replace(count).filter(|last| *last != count) else {
-                continue;
-            };
-            let Some(raw) = counter.value.place.read(telegram) else { continue };
-            let marker = Position(counter.value.position(raw, position.get()));
-            let when = self.history.time_at(marker, since);
-            let bits = counter.counter.width.bits();
-            let several =
-                count.wrapping_sub(last).rem_euclid(1_i64.checked_shl(bits).unwrap_or(i64::MAX)) != 1;
-            markers[place] = Some((marker, when, several));
-            if self.watching.contains(counter.kind) {
-                self.give(counter.kind, CaptureStatus::Captured, marker, when);
-            }
-        }
+        let switched = self.compare_inputs(program, sample);
+        let markers = self.compare_counters(program, sample);
         for (place, sequence) in program.sequences.iter().enumerate() {
             if !self.watching.contains(sequence.kind) {
                 self.awaiting[place] = false;
@@ -296,9 +282,9 @@ impl CaptureUnit {
                     self.awaiting[place] = true;
                     continue;
                 }
-                (false, true, Some((marker, when, false))) => {
+                (false, true, Some(Marker { position, at, several: false })) => {
                     self.awaiting[place] = false;
-                    self.give(sequence.kind, CaptureStatus::Captured, marker, when);
+                    self.give(sequence.kind, CaptureStatus::Captured, position, at);
                     continue;
                 }
                 // Which of several markers was the first, or whether it came after the switch, cannot be told.
@@ -306,8 +292,49 @@ impl CaptureUnit {
                 (false, ..) => continue,
             };
             self.awaiting[place] = false;
-            self.give(sequence.kind, status, position, at);
+            self.give(sequence.kind, status, sample.position, sample.at);
         }
+    }
+
+    /// The inputs that have switched on; those that are looked for by themselves are captured at the actual position.
+    fn compare_inputs(&mut self, program: &CaptureProgram, sample: &Sample<'_>) -> [bool; CAPTURES_MAX] {
+        let mut switched = [false; CAPTURES_MAX];
+        for (place, input) in program.inputs.iter().enumerate() {
+            let Some(word) = input.word.read_word(sample.telegram) else { continue };
+            let level = input.pattern.matches(word);
+            let before = self.inputs[place].replace(level);
+            switched[place] = level && before == Some(false);
+            if switched[place] && self.watching.contains(input.kind) {
+                self.give(input.kind, CaptureStatus::Captured, sample.position, sample.at);
+            }
+        }
+        switched
+    }
+
+    /// The newest marker of each counter that has changed; those that are looked for by themselves are captured.
+    fn compare_counters(
+        &mut self,
+        program: &CaptureProgram,
+        sample: &Sample<'_>,
+    ) -> [Option<Marker>; CAPTURES_MAX] {
+        let mut markers = [None; CAPTURES_MAX];
+        for (place, counter) in program.counters.iter().enumerate() {
+            let Some(count) = counter.counter.read(sample.telegram) else { continue };
+            let Some(last) = self.counters[place].replace(count).filter(|last| *last != count) else {
+                continue;
+            };
+            let Some(raw) = counter.value.place.read(sample.telegram) else { continue };
+            let position = Position(counter.value.position(raw, sample.position.get()));
+            let at = self.history.time_at(position, sample.since);
+            let bits = counter.counter.width.bits();
+            let several =
+                count.wrapping_sub(last).rem_euclid(1_i64.checked_shl(bits).unwrap_or(i64::MAX)) != 1;
+            markers[place] = Some(Marker { position, at, several });
+            if self.watching.contains(counter.kind) {
+                self.give(counter.kind, CaptureStatus::Captured, position, at);
+            }
+        }
+        markers
     }
 
     fn move_gate(&mut self, program: &CaptureProgram, place: usize) {
@@ -315,6 +342,18 @@ impl CaptureUnit {
             // It stays as it is.
             return;
         }
+        let Some(next) = self.next_phase(program, place) else { return };
+        self.gates[place].go(next);
+        match next {
+            Phase::Rising => self.select(program, place),
+            // It may rise again at once.
+            Phase::Off => self.move_gate(program, place),
+            _ => {}
+        }
+    }
+
+    /// The phase that a gate goes to; `None` while it stays in its own.
+    fn next_phase(&self, program: &CaptureProgram, place: usize) -> Option<Phase> {
         let own = |latch: &&Latch| latch.enable == place;
         let wanted = program.latches.iter().filter(own).any(|latch| self.is_wanted(latch.kind));
         let cyclic = program.enables[place].place.offset.is_some();
@@ -324,43 +363,45 @@ impl CaptureUnit {
         let clear = program.latches.iter().filter(own).all(|latch| {
             program.words[latch.word].offset.is_none() || !latch.pattern.matches(self.words[latch.word])
         });
-        let reading = (0..).zip(&program.latches).any(|(at, latch)| own(&latch) && self.unread[at]);
-        let next = match gate.phase {
+        match gate.phase {
             Phase::Off => {
                 let ready = program.command.is_none() || self.command == Command::Active;
                 (wanted && ready && clear).then_some(Phase::Rising)
             }
             Phase::Rising | Phase::Armed => {
-                // What has come, or what the drive was not told to look for.
-                let again = (0..).zip(&program.latches).any(|(at, latch): (usize, _)| {
-                    let open = latch.select & !gate.bits == 0;
-                    own(&latch) && self.is_wanted(latch.kind) && (self.latched[at] || !open)
-                });
-                if !reading && (!wanted || again) {
+                let mut latches = (0..).zip(&program.latches);
+                let reading = latches.any(|(at, latch)| own(&latch) && self.unread[at]);
+                if !reading && (!wanted || self.selects_again(program, place)) {
                     Some(Phase::Falling)
                 } else {
                     (gate.phase == Phase::Rising && arrived).then_some(Phase::Armed)
                 }
             }
             Phase::Falling => (arrived && clear).then_some(Phase::Off),
-        };
-        let Some(next) = next else { return };
-        self.gates[place].go(next);
-        match next {
-            Phase::Rising => {
-                let latches = program.latches.iter().filter(own);
-                let selected = latches.filter(|latch| self.is_wanted(latch.kind)).map(|latch| latch.select);
-                self.gates[place].bits = selected.fold(program.enables[place].on, |bits, one| bits | one);
-                for (at, latch) in program.latches.iter().enumerate().filter(|(_, latch)| own(latch)) {
-                    self.latched[at] = false;
-                    if program.words[latch.word].offset.is_none() {
-                        self.words[latch.word] &= !latch.pattern.mask;
-                    }
-                }
+        }
+    }
+
+    /// Whether something is wanted of a gate that has come, or that the drive was not told to look for.
+    fn selects_again(&self, program: &CaptureProgram, place: usize) -> bool {
+        let gate = self.gates[place];
+        let mut own = program.latches.iter().enumerate().filter(|(_, latch)| latch.enable == place);
+        own.any(|(at, latch)| {
+            let open = latch.select & !gate.bits == 0;
+            self.is_wanted(latch.kind) && (self.latched[at] || !open)
+        })
+    }
+
+    /// Selects what is wanted of a gate that rises, and forgets the edges of before.
+    fn select(&mut self, program: &CaptureProgram, place: usize) {
+        let own = |latch: &&Latch| latch.enable == place;
+        let latches = program.latches.iter().filter(own);
+        let selected = latches.filter(|latch| self.is_wanted(latch.kind)).map(|latch| latch.select);
+        self.gates[place].bits = selected.fold(program.enables[place].on, |bits, one| bits | one);
+        for (at, latch) in program.latches.iter().enumerate().filter(|(_, latch)| own(latch)) {
+            self.latched[at] = false;
+            if program.words[latch.word].offset.is_none() {
+                self.words[latch.word] &= !latch.pattern.mask;
             }
-            // It may rise again at once.
-            Phase::Off => self.move_gate(program, place),
-            _ => {}
         }
     }
 

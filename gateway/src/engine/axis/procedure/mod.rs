@@ -26,7 +26,7 @@ use profile_generic::mode::ModeSelection;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
 use crate::engine::access::{Access, AccessFailure, Operation, Progress};
-use crate::mapping::{Procedure, ProcedureBy};
+use crate::mapping::{ModeProcedure, Procedure, ProcedureBy};
 
 /// How often the drive is asked how far a command is.
 const ASK_EVERY: DurationNs = DurationNs::from_millis(10);
@@ -192,31 +192,14 @@ impl ProcedureUnit {
         });
         let passed = around.now.since(self.since);
         let next = match (self.stage, mode) {
-            (Stage::Leave(end, came), _) => {
-                let rests = around.stands && came >= SETTLED_AFTER;
-                if rests || !around.operating || passed > REST_TIME_OUT {
-                    Stage::Settling(end)
-                } else {
-                    Stage::Leave(end, came.saturating_add(1))
-                }
-            }
+            (Stage::Leave(end, came), _) => leave(end, came, passed, around),
             (_, None) => Stage::Leave(End::Dropped, 0),
             (_, Some(_)) if !around.operating => Stage::Leave(End::Failed, 0),
             (Stage::Enter, Some(mode)) if mode.shown.matches(around.status) => {
                 Stage::Run { stale: mode.is_done(around.status) || mode.has_failed(around.status) }
             }
             (Stage::Enter, Some(_)) if passed > MODE_TIME => Stage::Leave(End::Failed, 0),
-            (Stage::Run { stale }, Some(mode)) => {
-                let (done, failed) = (mode.is_done(around.status), mode.has_failed(around.status));
-                let stale = stale && (done || failed) && passed <= MODE_TIME;
-                if !stale && done {
-                    Stage::Leave(End::Done, 0)
-                } else if !stale && failed || passed > mode.time_out {
-                    Stage::Leave(End::Failed, 0)
-                } else {
-                    Stage::Run { stale }
-                }
-            }
+            (Stage::Run { stale }, Some(mode)) => run(mode, stale, passed, around),
             (stage, _) => stage,
         };
         let same = std::mem::discriminant(&next) == std::mem::discriminant(&self.stage);
@@ -382,6 +365,29 @@ impl ProcedureUnit {
             _ => {}
         }
         false
+    }
+}
+
+/// A mode whose bit is taken back, until the axis stands.
+fn leave(end: End, came: u8, passed: DurationNs, around: &Surroundings) -> Stage {
+    let rests = around.stands && came >= SETTLED_AFTER;
+    if rests || !around.operating || passed > REST_TIME_OUT {
+        Stage::Settling(end)
+    } else {
+        Stage::Leave(end, came.saturating_add(1))
+    }
+}
+
+/// A mode whose bit is set, until the status says how it went. `stale`: what it says may be of the procedure before.
+fn run(mode: &ModeProcedure, stale: bool, passed: DurationNs, around: &Surroundings) -> Stage {
+    let (done, failed) = (mode.is_done(around.status), mode.has_failed(around.status));
+    let stale = stale && (done || failed) && passed <= MODE_TIME;
+    if !stale && done {
+        Stage::Leave(End::Done, 0)
+    } else if !stale && failed || passed > mode.time_out {
+        Stage::Leave(End::Failed, 0)
+    } else {
+        Stage::Run { stale }
     }
 }
 

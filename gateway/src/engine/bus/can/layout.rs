@@ -284,26 +284,18 @@ impl AxisPdos {
             if all.is_empty() { "none".to_owned() } else { all.join(", ") }
         };
         let missing = |object| NotMapped { object, direction, found: listed() };
-        let mut row = 0;
-        let mut froms = Vec::with_capacity(values.len());
-        for (_, len) in values {
-            froms.push(row);
-            row += usize::from(*len);
-        }
-        let has_id = |pdo: &FoundPdo| {
-            pdo.id.is_some() || self.ids_of(direction).is_some() || pdo.number <= DEFAULT_PDOS
-        };
-        let usable = |pdo: &&FoundPdo| {
-            if !has_id(pdo) {
-                return false;
-            }
-            // Every bit is that of a value, or of a gap: nothing is sent that nobody has set.
-            let brought = values.iter().filter(|value| carries(pdo, value).is_some());
-            let brought: usize = brought.map(|(_, len)| usize::from(*len) * 8).sum();
-            let bits = |entry: &MappingEntry| usize::from(entry.bits());
-            let gaps: usize = pdo.mapping.iter().filter(|entry| entry.is_dummy()).map(bits).sum();
-            direction == Direction::Transmit || brought + gaps == pdo.mapping.iter().map(bits).sum::<usize>()
-        };
+        let used = self.choose(direction, values, &found).map_err(missing)?;
+        self.use_kept(direction, values, &used).map_err(missing)
+    }
+
+    /// As few PDOs as bring all values, by their numbers; else the value that none of them brings.
+    fn choose<'f>(
+        &self,
+        direction: Direction,
+        values: &[(Object, u8)],
+        found: &[&'f FoundPdo],
+    ) -> Result<Vec<&'f FoundPdo>, Object> {
+        let usable = |pdo: &&FoundPdo| self.is_usable(direction, values, pdo);
         let mut free: Vec<&FoundPdo> = found.iter().copied().filter(usable).collect();
         let mut rest: Vec<(Object, u8)> = values.to_vec();
         let mut used: Vec<&FoundPdo> = Vec::new();
@@ -312,12 +304,42 @@ impl AxisPdos {
             // The lowest number of those that bring as much.
             let best = free.iter().copied().rev().max_by_key(|pdo| brings(pdo));
             let best = best.filter(|pdo| brings(pdo) > 0 && used.len() < PDOS_MAX);
-            let best = best.ok_or_else(|| missing(*first))?;
+            let best = best.ok_or(*first)?;
             rest.retain(|value| carries(best, value).is_none());
             free.retain(|pdo| pdo.number != best.number);
             used.push(best);
         }
         used.sort_by_key(|pdo| pdo.number);
+        Ok(used)
+    }
+
+    /// Whether a PDO has an identifier, and, if the drive receives it, brings nothing but these values.
+    fn is_usable(&self, direction: Direction, values: &[(Object, u8)], pdo: &FoundPdo) -> bool {
+        let has_id = pdo.id.is_some() || self.ids_of(direction).is_some() || pdo.number <= DEFAULT_PDOS;
+        if !has_id {
+            return false;
+        }
+        // Every bit is that of a value, or of a gap: nothing is sent that nobody has set.
+        let brought = values.iter().filter(|value| carries(pdo, value).is_some());
+        let brought: usize = brought.map(|(_, len)| usize::from(*len) * 8).sum();
+        let bits = |entry: &MappingEntry| usize::from(entry.bits());
+        let gaps: usize = pdo.mapping.iter().filter(|entry| entry.is_dummy()).map(bits).sum();
+        direction == Direction::Transmit || brought + gaps == pdo.mapping.iter().map(bits).sum::<usize>()
+    }
+
+    /// PDOs as the device has them, with the places of the values; else the value that has too many places.
+    fn use_kept(
+        &self,
+        direction: Direction,
+        values: &[(Object, u8)],
+        used: &[&FoundPdo],
+    ) -> Result<(Vec<PdoConfig>, PdoMap), Object> {
+        let mut row = 0;
+        let mut froms = Vec::with_capacity(values.len());
+        for (_, len) in values {
+            froms.push(row);
+            row += usize::from(*len);
+        }
         let mut pdo_map = PdoMap { len: row, ..PdoMap::default() };
         let mut configs = Vec::with_capacity(used.len());
         for (place, pdo) in used.iter().enumerate() {
@@ -328,7 +350,7 @@ impl AxisPdos {
                     direction == Direction::Transmit && pdo_map.parts.iter().any(|part| part.from == *from);
                 let Some(at) = carries(pdo, value).filter(|_| !again) else { continue };
                 let part = Part { pdo: place, at, from: *from, len: usize::from(value.1) };
-                pdo_map.parts.try_push(part).map_err(|_| missing(value.0))?;
+                pdo_map.parts.try_push(part).map_err(|_| value.0)?;
             }
             configs.push(PdoConfig {
                 id: pdo.id.or_else(|| Some(self.ids_of(direction)?[place])),

@@ -186,45 +186,18 @@ impl SercosBus {
         notice: &mut dyn FnMut(Notice),
     ) {
         match event {
-            Event::Scanned { .. } => {
-                self.refused.clear();
-            }
+            Event::Scanned { .. } => self.refused.clear(),
             // Its data are listened to again, and it was spoken to all the time.
-            Event::SlaveReturned { .. }
-                if self.drives.iter().all(|drive| drive.slave.is_some() && !self.is_lost(drive)) =>
-            {
-                self.recovery.find_all();
-            }
+            Event::SlaveReturned { .. } if self.has_all_slaves() => self.recovery.find_all(),
             Event::Isolated { .. } => self.recovery.isolate(),
-            Event::OtherMaster(_) => {
-                for drive in &self.drives {
-                    axes[drive.axis].doubt_south(now, system);
-                }
-            }
+            Event::OtherMaster(_) => self.doubt_all(now, system, axes),
             Event::GaveWay => {
                 self.recovery.give_way();
                 self.lose_all(now, system, axes);
             }
-            Event::AwaitingApplication { phase } if *phase == Phase::CP2 => {
-                self.exclude_refused();
-                for place in 0..self.drives.len() {
-                    self.begin(place, mapping, notice);
-                }
-            }
-            Event::AwaitingApplication { phase } => {
-                self.exclude_refused();
-                for drive in self.drives.iter_mut().filter(|drive| drive.slave.is_some()) {
-                    drive.plan(mapping, *phase, notice);
-                }
-            }
+            Event::AwaitingApplication { phase } => self.begin_all(*phase, mapping, notice),
             Event::HotPlugAwaits { slave, address, phase } => self.begin_joining(*slave, *address, *phase),
-            Event::HotPlugged { slave, .. } => {
-                let drive = self.drives.iter_mut().find(|drive| drive.slave == Some(*slave));
-                drive.into_iter().for_each(|drive| drive.stage = Stage::Ready);
-                if self.is_complete() {
-                    self.recovery.complete();
-                }
-            }
+            Event::HotPlugged { slave, .. } => self.complete_joining(*slave),
             Event::HotPlugRefused { address: Some(address), reason } => {
                 self.refuse_joining(now, system, *address, *reason, axes);
             }
@@ -234,18 +207,14 @@ impl SercosBus {
             | Event::NoConnection { slave, .. }
             | Event::CheckFailed { slave, .. }
                 if self.is_joining(*slave) => {}
-            Event::Phase(phase) if *phase == Phase::CP4 => {
+            Event::Phase(Phase::CP4) => {
                 let fit = self.drives.iter_mut().filter(|drive| drive.slave.is_some());
                 fit.for_each(|drive| drive.setup.unfit = false);
                 let is_complete = self.is_complete();
                 self.recovery.reach_cp4(now, is_complete);
             }
             Event::SlaveLost { slave, address, phase } => {
-                // One that comes back by hot plug needs no new scan.
-                let facts = self.master.slave(*slave).map(|info| info.facts);
-                let has_class = facts.is_some_and(|facts| facts.version(ScpClass::HOT_PLUG).is_some());
-                let configured = |drive: &Drive| drive.setup.address == *address && drive.hot_plug;
-                if !has_class && !self.drives.iter().any(configured) {
+                if !self.comes_by_hot_plug(*slave, *address) {
                     self.recovery.miss(now);
                 }
                 // In CP4 it may hear every word and be back in a moment: it is told to stop as long as its place is kept. That
@@ -257,10 +226,7 @@ impl SercosBus {
             Event::StepFailed { slave, idn, failure: SvcFailure::Refused { .. } }
                 if self.may_be_bare(*slave, *idn) =>
             {
-                for drive in self.drives.iter_mut().filter(|drive| drive.slave == Some(*slave)) {
-                    drive.setup.needs.bare = true;
-                    notice(Notice::Bare { axis: index(drive.axis), address: drive.setup.address });
-                }
+                self.make_bare(*slave, notice);
                 self.refuse(now, system, *slave, axes);
             }
             // The master waits again for its application: the others go on without the slave that stands in the way.
@@ -279,6 +245,34 @@ impl SercosBus {
             }
             Event::AllSlavesLost | Event::Stopped => self.lose_all(now, system, axes),
             _ => {}
+        }
+    }
+
+    /// Whether every drive has a slave, and the master has lost none of them.
+    fn has_all_slaves(&self) -> bool {
+        self.drives.iter().all(|drive| drive.slave.is_some() && !self.is_lost(drive))
+    }
+
+    /// Whether a slave comes back by hot plug, and needs no new scan.
+    fn comes_by_hot_plug(&self, slave: SlaveId, address: u16) -> bool {
+        let facts = self.master.slave(slave).map(|info| info.facts);
+        let has_class = facts.is_some_and(|facts| facts.version(ScpClass::HOT_PLUG).is_some());
+        let configured = |drive: &Drive| drive.setup.address == address && drive.hot_plug;
+        has_class || self.drives.iter().any(configured)
+    }
+
+    /// Nobody knows which master a drive follows.
+    fn doubt_all(&self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
+        for drive in &self.drives {
+            axes[drive.axis].doubt_south(now, system);
+        }
+    }
+
+    /// The drives of a slave do with less of the configuration list.
+    fn make_bare(&mut self, slave: SlaveId, notice: &mut dyn FnMut(Notice)) {
+        for drive in self.drives.iter_mut().filter(|drive| drive.slave == Some(slave)) {
+            drive.setup.needs.bare = true;
+            notice(Notice::Bare { axis: index(drive.axis), address: drive.setup.address });
         }
     }
 
@@ -337,6 +331,20 @@ impl SercosBus {
             } else {
                 axis.lose_south(now, system);
             }
+        }
+    }
+
+    /// Starts the commissioning of all drives for the phase in which the master waits.
+    fn begin_all(&mut self, phase: Phase, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) {
+        self.exclude_refused();
+        if phase == Phase::CP2 {
+            for place in 0..self.drives.len() {
+                self.begin(place, mapping, notice);
+            }
+            return;
+        }
+        for drive in self.drives.iter_mut().filter(|drive| drive.slave.is_some()) {
+            drive.plan(mapping, phase, notice);
         }
     }
 
@@ -411,6 +419,15 @@ impl SercosBus {
     fn is_joining(&self, slave: SlaveId) -> bool {
         let joining = |drive: &Drive| matches!(drive.stage, Stage::Joining { .. });
         self.drives.iter().any(|drive| drive.slave == Some(slave) && joining(drive))
+    }
+
+    /// A slave has come in by hot plug.
+    fn complete_joining(&mut self, slave: SlaveId) {
+        let drive = self.drives.iter_mut().find(|drive| drive.slave == Some(slave));
+        drive.into_iter().for_each(|drive| drive.stage = Stage::Ready);
+        if self.is_complete() {
+            self.recovery.complete();
+        }
     }
 
     /// A slave is on its way in by hot plug: the drive of an axis, or one that nobody asked for.
