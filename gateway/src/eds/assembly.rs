@@ -1,6 +1,6 @@
 //! The assemblies of a sheet, and the connections to them.
 
-use profile_cip::assembly::layout::{CONFIGURATION_POINT, INPUT_ONLY_POINT, LISTEN_ONLY_POINT};
+use profile_cip::assembly::layout::{CONFIGURATION_POINT, INPUT_ONLY_POINT, LISTEN_ONLY_POINT, Placed};
 use profile_cip::assembly::{Assemblies, RUN_IDLE_LEN};
 use profile_cip::device::config::AdapterConfig;
 use profile_cip::device::objects::class::CLASS_ASSEMBLY;
@@ -40,25 +40,77 @@ fn segment(kind: u8, number: u16) -> String {
     }
 }
 
-/// The section with the assemblies.
+/// Number of the parameter that stands for the first field of the output assembly; those of the others follow, output before input.
+const FIRST_FIELD: u16 = 10;
+
+/// Characters that a help text may have.
+const HELP_MAX: usize = 64;
+
+/// The fields of both assemblies, each with the number of its parameter.
+fn fields(assemblies: &Assemblies) -> [Vec<(u16, Placed)>; 2] {
+    let mut numbers = FIRST_FIELD..;
+    [assemblies.output(), assemblies.input()]
+        .map(|placed| placed.into_iter().zip(&mut numbers).map(|(field, number)| (number, field)).collect())
+}
+
+/// The code of a data type of the fields.
+fn data_type(kind: &str) -> u8 {
+    match kind {
+        "INT" => 0xC3,
+        "DINT" => 0xC4,
+        "LINT" => 0xC5,
+        "USINT" => 0xC6,
+        "UINT" => 0xC7,
+        "UDINT" => 0xC8,
+        "BYTE" => 0xD1,
+        kind => unreachable!("no field has the data type {kind}"),
+    }
+}
+
+/// A parameter for each field: its name, data type and description.
+pub(super) fn field_parameters(w: &mut Writer, assemblies: &Assemblies) {
+    for (number, field) in fields(assemblies).iter().flatten() {
+        let name = match assemblies.axes() {
+            1 => field.name.to_owned(),
+            _ => format!("axis {} {}", field.axis + 1, field.name),
+        };
+        let whole = Some(field.description).filter(|text| text.len() <= HELP_MAX);
+        let help = whole.or_else(|| field.description.split([':', '.', ';']).next()).unwrap_or_default();
+        let help = if help.len() <= HELP_MAX { help } else { "" };
+        let size = u16::try_from(field.len).unwrap_or(0);
+        let range = [Field::Empty, Field::Empty, Field::Number(0)];
+        super::entry(w, *number, (data_type(field.kind), size), [&name, "", help], range);
+    }
+}
+
+/// The section with the assemblies. The members of an assembly are its fields in their order: each one begins where the one before it ends.
 pub(super) fn section(w: &mut Writer, adapter: &AdapterConfig) {
     let Some(assemblies) = &adapter.assembly else { return };
     w.section("Assembly");
     w.entry("Object_Name", &[Field::Text("Assembly Object")]);
     w.entry("Object_Class_Code", &[Field::Hex(u32::from(CLASS_ASSEMBLY), 2)]);
     let size = |len: usize| Field::Number(u32::try_from(len).unwrap_or(0));
-    for (number, name, len) in [
-        (assemblies.output_point(), "Output", assemblies.output_len()),
-        (assemblies.input_point(), "Input", assemblies.input_len()),
-        (CONFIGURATION_POINT, "Configuration", 0),
-        (INPUT_ONLY_POINT, "Heartbeat of input only", 0),
-        (LISTEN_ONLY_POINT, "Heartbeat of listen only", 0),
+    let [output, input] = fields(assemblies);
+    for (number, name, len, members) in [
+        (assemblies.output_point(), "Output", assemblies.output_len(), output),
+        (assemblies.input_point(), "Input", assemblies.input_len(), input),
+        (CONFIGURATION_POINT, "Configuration", 0, Vec::new()),
+        (INPUT_ONLY_POINT, "Heartbeat of input only", 0, Vec::new()),
+        (LISTEN_ONLY_POINT, "Heartbeat of listen only", 0, Vec::new()),
     ] {
         let path = format!("20 04 {}", segment(0x24, number));
-        w.entry(
-            &point(number),
-            &[Field::Text(name), Field::Text(&path), size(len), Field::Hex(0, 4), Field::Empty, Field::Empty],
-        );
+        let mut row = vec![
+            Field::Text(name),
+            Field::Text(&path),
+            size(len),
+            Field::Hex(0, 4),
+            Field::Empty,
+            Field::Empty,
+        ];
+        for (parameter, field) in members {
+            row.extend([size(8 * field.len), Field::Reference(parameter)]);
+        }
+        w.entry(&point(number), &row);
     }
 }
 
@@ -133,3 +185,24 @@ pub(super) fn connections(w: &mut Writer, assemblies: &Assemblies) {
 }
 
 const _: () = assert!(RUN_IDLE_LEN == 4 && CONFIGURATION_POINT == 151);
+
+#[cfg(test)]
+mod tests {
+    use profile_cip::assembly::field::{InputField, OutputField};
+    use profile_cip::assembly::layout::Layout;
+
+    use super::*;
+
+    #[test]
+    fn every_field_has_a_data_type() {
+        let own = OutputField::ALL
+            .iter()
+            .map(|field| field.kind())
+            .chain(InputField::ALL.iter().map(|field| field.kind()));
+        let speed = Assemblies::new(Layout::shipped("speed").unwrap(), 1).unwrap();
+        let fields = [speed.output(), speed.input()].concat();
+        for kind in own.chain(fields.iter().map(|field| field.kind)) {
+            assert!((0xC3..=0xD1).contains(&data_type(kind)), "{kind}");
+        }
+    }
+}

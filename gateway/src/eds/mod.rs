@@ -138,7 +138,8 @@ fn parameters(w: &mut Writer, adapter: &AdapterConfig) {
         [motion.rpi_min_us, motion.acceptable_rpi_us(u32::MAX), motion.acceptable_rpi_us(RPI_PROPOSED_US)];
     let interval = if adapter.assembly.is_some() { "Packet interval" } else { "Controller Update Period" };
     param(w, PARAM_RPI, UDINT, (interval, "us"), rpi);
-    if adapter.assembly.is_some() {
+    if let Some(assemblies) = &adapter.assembly {
+        assembly::field_parameters(w, assemblies);
         return;
     }
     let size = |most: u16| {
@@ -152,7 +153,12 @@ fn parameters(w: &mut Writer, adapter: &AdapterConfig) {
 
 /// A parameter that only the sheet has: least, greatest and proposed value.
 fn param(w: &mut Writer, number: u16, data_type: u8, (name, unit): (&str, &str), range: [u32; 3]) {
-    let size = if data_type == UDINT { 4u16 } else { 2 };
+    let size = if data_type == UDINT { 4 } else { 2 };
+    entry(w, number, (data_type, size), [name, unit, ""], range.map(Field::Number));
+}
+
+/// A parameter of this data type and so many bytes; name, unit and help; least, greatest and proposed value.
+fn entry(w: &mut Writer, number: u16, (data_type, size): (u8, u16), texts: [&str; 3], range: [Field<'_>; 3]) {
     let mut fields = vec![
         Field::from(0u16),
         // Link path size and link path: it is no attribute.
@@ -161,11 +167,9 @@ fn param(w: &mut Writer, number: u16, data_type: u8, (name, unit): (&str, &str),
         Field::Hex(0, 4),
         Field::Hex(u32::from(data_type), 2),
         Field::from(size),
-        Field::Text(name),
-        Field::Text(unit),
-        Field::Text(""),
     ];
-    fields.extend(range.map(Field::Number));
+    fields.extend(texts.map(Field::Text));
+    fields.extend(range);
     // Multiplier, divider, base, offset, links to them, and decimal places: the values are as they are.
     fields.extend([const { Field::Empty }; 9]);
     w.entry(&format!("Param{number}"), &fields);

@@ -170,8 +170,25 @@ fn the_parser_of_another_maker_reads_the_assemblies_of_a_sheet() {
     let got: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     let sections = &got["sections"];
     assert_eq!(sections["Device"]["ProdType"], json!([43]));
-    assert_eq!(sections["Assembly"]["Assem150"], json!(["Output", "20 04 24 96", 32, 0, "", ""]));
-    assert_eq!(sections["Assembly"]["Assem100"], json!(["Input", "20 04 24 64", 40, 0, "", ""]));
+    let members = |assembly: &str, head: Value| {
+        let entry = sections["Assembly"][assembly].as_array().expect("an entry");
+        assert_eq!(json!(entry[..6]), head);
+        let members = entry[6..].chunks(2).map(|member| {
+            let parameter = &sections["Params"][member[1].as_str().expect("the name of a parameter")];
+            // Name, data type, and bits in the assembly; the size of the parameter is the same in bytes.
+            assert_eq!(parameter[5].as_u64().map(|bytes| 8 * bytes), member[0].as_u64());
+            (parameter[6].as_str().expect("a name"), parameter[4].as_u64(), member[0].as_u64().expect("bits"))
+        });
+        members.collect::<Vec<_>>()
+    };
+    let output = members("Assem150", json!(["Output", "20 04 24 96", 32, 0, "", ""]));
+    let input = members("Assem100", json!(["Input", "20 04 24 64", 40, 0, "", ""]));
+    for (members, bytes) in [(&output, 32), (&input, 40)] {
+        assert_eq!(members.iter().map(|(.., bits)| bits).sum::<u64>(), 8 * bytes, "{members:?}");
+    }
+    // As `axisbridge assembly` prints them.
+    assert_eq!(output[..2], [("axis 1 control", Some(0xC7), 16), ("axis 1 pad_16", Some(0xC7), 16)]);
+    assert_eq!(input[input.len() / 2].0, "axis 2 status", "{input:?}");
     assert_eq!(
         sections["Connection Manager"]["Connection1"],
         json!([

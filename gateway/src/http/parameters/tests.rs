@@ -55,6 +55,9 @@ pub fn examples() -> [(&'static str, Value); 2] {
     ]
 }
 
+/// What an access came to: the attribute of a SERCOS parameter, or why there is no value.
+type Outcome = Result<Option<Attribute>, DirectFailure>;
+
 /// A server, and the engine's side of its accesses. The first axis has a SERCOS drive.
 struct Site {
     bench: Bench,
@@ -99,11 +102,7 @@ impl Site {
     }
 
     /// Sends a request, and answers its accesses.
-    fn ask(
-        &mut self,
-        path: &str,
-        answers: &[(Result<Option<Attribute>, DirectFailure>, &[u8])],
-    ) -> (Vec<Target>, u16, Value) {
+    fn ask(&mut self, path: &str, answers: &[(Outcome, &[u8])]) -> (Vec<Target>, u16, Value) {
         let address = self.bench.address;
         let path = path.to_owned();
         let asked = std::thread::spawn(move || get(address, &path));

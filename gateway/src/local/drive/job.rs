@@ -168,7 +168,7 @@ pub struct Context<'a> {
 #[derive(Debug)]
 pub enum Job {
     /// For parameters.
-    Parameter(ParameterJob),
+    Parameter(Box<ParameterJob>),
     /// For a procedure command.
     Command(CommandJob),
 }
@@ -197,7 +197,9 @@ impl Job {
             Ask::Command { id, act } => {
                 CommandJob::begin(id, act, context).map(|(job, step)| (Self::Command(job), step))
             }
-            ask => ParameterJob::begin(ask, context).map(|(job, step)| (Self::Parameter(job), step)),
+            ask => {
+                ParameterJob::begin(ask, context).map(|(job, step)| (Self::Parameter(Box::new(job)), step))
+            }
         }
     }
 
