@@ -396,7 +396,7 @@ fn only_the_explicit_connection_of_a_devicenet_drive_is_allocated_and_it_is_give
     assert_eq!(with_drive(&network, Slave::master), Some(mac(1)));
     let written = ask(&mut session, "write x 66.1.441 75.5");
     let expected = "ok write x {\"id\":\"66.1.441\",\"name\":\"Kpp\",\"type\":\"f32\",\"unit\":\"Radians/Sec\",\
-                    \"access\":\"Set\",\"value\":\"75.5\",\"before\":\"50\",\"data\":\"00009742\"}\n";
+                    \"access\":\"Set\",\"writable\":\"without torque\",\"value\":\"75.5\",\"before\":\"50\",\"data\":\"00009742\"}\n";
     assert_eq!(written, expected);
     assert!(ask(&mut session, "read x 1.1.7").contains("\"value\":\"simulated drive\""));
     for (request, reply) in [
