@@ -176,7 +176,8 @@ fn fault_of_a_drive_has_one_name_in_status_metrics_and_page_stream() {
         let paths: Vec<&String> = description["paths"].as_object().expect("paths").keys().collect();
         for path in &paths {
             let needed = match path.as_str() {
-                "/api/v1/traces" | "/api/v1/axis" => "?axis=slide",
+                "/api/v1/traces" | "/api/v1/axis" | "/api/v1/parameters" => "?axis=slide",
+                "/api/v1/parameter" => "?axis=slide&id=S-0-0104",
                 "/api/v1/eds" => "?device=front",
                 _ => "",
             };
