@@ -41,8 +41,19 @@ class Browser:
             arguments, preexec_fn=descriptors, close_fds=False, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )
         os.close(to_read), os.close(to_write)
-        self.rest, self.number, self.session = b"", 0, None
+        self.rest, self.number, self.target, self.session = b"", 0, None, None
         self.complaints, self.requests = [], []
+
+    def open(self, url, ready="true"):
+        """Opens a page in daylight on a desk, and waits until it is live and `ready`."""
+        self.target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=self.target, flatten=True)["sessionId"]
+        for domain in ("Runtime", "Log", "Network", "Page"):
+            self.call(f"{domain}.enable")
+        self.call("Page.bringToFront")
+        self.look("light", "desk")
+        self.call("Page.navigate", url=url)
+        self.until(f"document.readyState === 'complete' && {LIVE} && {ready}", url)
 
     def messages(self, seconds):
         ready, _, _ = select.select([self.from_browser], [], [], seconds)
@@ -224,14 +235,7 @@ def main():
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         browser = Browser(chromium, profile)
         try:
-            target = browser.call("Target.createTarget", url="about:blank")["targetId"]
-            browser.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-            for domain in ("Runtime", "Log", "Network", "Page"):
-                browser.call(f"{domain}.enable")
-            browser.call("Page.bringToFront")
-            browser.look("light", "desk")
-            browser.call("Page.navigate", url=url)
-            browser.until(f"document.readyState === 'complete' && {LIVE}", "the page")
+            browser.open(url)
             report = {
                 "views": views(browser, url, folder), "bookmark": reload(browser, url), "filtered": filtered(browser),
                 "keyboard": keyboard(browser, url),

@@ -16,7 +16,7 @@ import time
 import urllib.request
 from pathlib import Path
 
-from page import FAINT, LIVE, VIEW, Browser
+from page import FAINT, VIEW, Browser
 
 SAYS = "document.getElementById('control-says').textContent"
 JOG = "document.getElementById('{}')"
@@ -99,14 +99,7 @@ def main():
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         browser = Browser(chromium, profile, ["--ignore-certificate-errors"])
         try:
-            target = browser.call("Target.createTarget", url="about:blank")["targetId"]
-            browser.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-            for domain in ("Runtime", "Log", "Network", "Page"):
-                browser.call(f"{domain}.enable")
-            browser.call("Page.bringToFront")
-            browser.look("light", "desk")
-            browser.call("Page.navigate", url=f"{url}#/axis/turntable")
-            browser.until(f"document.readyState === 'complete' && {LIVE} && !!{VIEW} && {VIEW}.id === 'view-axis'", "the axis")
+            browser.open(f"{url}#/axis/turntable", f"!!{VIEW} && {VIEW}.id === 'view-axis'")
             for secret in ("not-the-right-token", token):
                 browser.until("document.querySelector('#token')?.checkVisibility() ?? false", "the login")
                 browser.value("document.getElementById('token').focus()")
@@ -155,7 +148,7 @@ def main():
             report["closing"] = watch(url, 1.0)
             report["complaints"] = browser.complaints
             browser.session = None
-            browser.call("Target.closeTarget", targetId=target)
+            browser.call("Target.closeTarget", targetId=browser.target)
             time.sleep(1.5)
         finally:
             browser.process.kill()

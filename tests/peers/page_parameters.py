@@ -13,7 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from page import FAINT, LIVE, VIEW, Browser
+from page import FAINT, VIEW, Browser
 
 GAIN = "S-0-0104"
 NOTE = "document.getElementById('parameter-note')?.textContent"
@@ -108,14 +108,7 @@ def main():
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         browser = Browser(chromium, profile)
         try:
-            target = browser.call("Target.createTarget", url="about:blank")["targetId"]
-            browser.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-            for domain in ("Runtime", "Log", "Network", "Page"):
-                browser.call(f"{domain}.enable")
-            browser.call("Page.bringToFront")
-            browser.look("light", "desk")
-            browser.call("Page.navigate", url=f"{url}#/axis/turntable")
-            browser.until(f"document.readyState === 'complete' && {LIVE} && !!{VIEW} && {VIEW}.id === 'view-axis'", "the axis")
+            browser.open(f"{url}#/axis/turntable", f"!!{VIEW} && {VIEW}.id === 'view-axis'")
             time.sleep(2)
             asked = [one for one in browser.requests if "/api/v1/parameter" in one]
             report["before"] = len(asked)

@@ -7,30 +7,11 @@ import json
 import struct
 import sys
 
+from explicit import ask
 from pycomm3 import CIPDriver, Services
 
 MOTION_AXIS = 0x42
 GET_AXIS_ATTRIBUTES_LIST = 0x4B
-
-
-def hexadecimal(data):
-    return data.hex() if data is not None else None
-
-
-def ask(driver, service, class_code, instance, attribute=b"", data=b"", connected=False):
-    """One request; what came back as hexadecimal, or the error as the client words it."""
-    answer = driver.generic_message(
-        service=service,
-        class_code=class_code,
-        instance=instance,
-        attribute=attribute,
-        request_data=data,
-        connected=connected,
-        unconnected_send=False,
-        route_path=False,
-        name="request",
-    )
-    return {"value": hexadecimal(answer.value), "error": answer.error}
 
 
 def get(driver, class_code, instance, attribute, connected=False):

@@ -6,6 +6,7 @@ Usage: pycomm3_device.py ADDRESS. Prints one JSON object; judged by tests/foreig
 import json
 import sys
 
+from explicit import request
 from pycomm3 import CIPDriver, Services
 
 TIME_SYNC = 0x43
@@ -15,28 +16,13 @@ LAST, FIRST_AND_LAST = 2, 4
 BLOCK = 200
 
 
-def ask(driver, service, class_code, instance, attribute=b"", data=b""):
-    """One request; the data that came back, or the error as the client words it."""
-    return driver.generic_message(
-        service=service,
-        class_code=class_code,
-        instance=instance,
-        attribute=attribute,
-        request_data=data,
-        connected=False,
-        unconnected_send=False,
-        route_path=False,
-        name="request",
-    )
-
-
 def upload(driver):
     """The data sheet, block by block, with the size that was announced and the sum of its bytes."""
-    begun = ask(driver, INITIATE_UPLOAD, FILE, EDS, data=bytes([BLOCK])).value
+    begun = request(driver, INITIATE_UPLOAD, FILE, EDS, data=bytes([BLOCK])).value
     size = int.from_bytes(begun[:4], "little")
     sheet, number = b"", 0
     while len(sheet) <= size:
-        block = ask(driver, UPLOAD_TRANSFER, FILE, EDS, data=bytes([number & 0xFF])).value
+        block = request(driver, UPLOAD_TRANSFER, FILE, EDS, data=bytes([number & 0xFF])).value
         if block[1] in (LAST, FIRST_AND_LAST):
             sheet += block[2:-2]
             total = (sum(sheet) + int.from_bytes(block[-2:], "little")) & 0xFFFF
@@ -50,9 +36,9 @@ def main(address):
     with CIPDriver(address) as driver:
         clock = {}
         for attribute in range(1, 29):
-            answer = ask(driver, Services.get_attribute_single, TIME_SYNC, 1, attribute)
+            answer = request(driver, Services.get_attribute_single, TIME_SYNC, 1, attribute)
             clock[attribute] = answer.error or answer.value.hex()
-        switched_on = ask(driver, Services.set_attribute_single, TIME_SYNC, 1, 1, b"\x01")
+        switched_on = request(driver, Services.set_attribute_single, TIME_SYNC, 1, 1, b"\x01")
         print(json.dumps({"clock": clock, "switched_on": switched_on.error, "sheet": upload(driver)}))
 
 

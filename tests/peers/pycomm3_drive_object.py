@@ -6,6 +6,7 @@ Usage: pycomm3_drive_object.py ADDRESS. Prints one JSON object; judged by tests/
 import json
 import sys
 
+from explicit import ask
 from pycomm3 import CIPDriver, Services
 
 DRIVE = 0x2A
@@ -23,23 +24,11 @@ ATTRIBUTES = {
 
 def main(address):
     with CIPDriver(address) as driver:
+        def drive(service, attribute, data=b""):
+            return ask(driver, service, DRIVE, 1, attribute, data)
 
-        def ask(service, attribute, data=b""):
-            answer = driver.generic_message(
-                service=service,
-                class_code=DRIVE,
-                instance=1,
-                attribute=attribute,
-                request_data=data,
-                connected=False,
-                unconnected_send=False,
-                route_path=False,
-                name="request",
-            )
-            return {"value": answer.value.hex() if answer.value is not None else None, "error": answer.error}
-
-        result = {name: ask(Services.get_attribute_single, number) for name, number in ATTRIBUTES.items()}
-        result["set_mode"] = ask(Services.set_attribute_single, ATTRIBUTES["drive_mode"], b"\x02")
+        result = {name: drive(Services.get_attribute_single, number) for name, number in ATTRIBUTES.items()}
+        result["set_mode"] = drive(Services.set_attribute_single, ATTRIBUTES["drive_mode"], b"\x02")
     print(json.dumps(result))
 
 

@@ -9,21 +9,8 @@ import json
 import sys
 import time
 
+from explicit import request
 from pycomm3 import CIPDriver
-
-
-def message(driver, service, attribute, data=b"", class_code=0x43, instance=1):
-    return driver.generic_message(
-        service=service,
-        class_code=class_code,
-        instance=instance,
-        attribute=attribute,
-        request_data=data,
-        connected=False,
-        unconnected_send=False,
-        route_path=False,
-        name="request",
-    )
 
 
 def main():
@@ -33,17 +20,17 @@ def main():
         for setting in settings:
             attribute, value = setting.split("=")
             of, number = (0x42, 0) if attribute.startswith("class ") else (0x43, 1)
-            answer = message(driver, b"\x10", int(attribute.removeprefix("class ")), bytes.fromhex(value), of, number)
+            answer = request(driver, b"\x10", of, number, int(attribute.removeprefix("class ")), bytes.fromhex(value))
             found["set " + attribute] = answer.error or "done"
         for attribute in range(1, 29):
             before = time.clock_gettime_ns(time.CLOCK_REALTIME)
-            answer = message(driver, b"\x0e", attribute)
+            answer = request(driver, b"\x0e", 0x43, 1, attribute)
             after = time.clock_gettime_ns(time.CLOCK_REALTIME)
             found[str(attribute)] = answer.value.hex() if answer.error is None else "error: " + answer.error
             if attribute == 4:
                 found["before"], found["after"] = before, after
         for attribute in (2, 3, 4, 5, 6, 7, 28, 29, 30):
-            answer = message(driver, b"\x0e", attribute, class_code=0x42, instance=0)
+            answer = request(driver, b"\x0e", 0x42, 0, attribute)
             found["class %d" % attribute] = answer.value.hex() if answer.error is None else "error: " + answer.error
     print(json.dumps(found))
 

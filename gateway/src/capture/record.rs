@@ -87,9 +87,10 @@ impl Head {
     }
 }
 
-/// Puts a record into a queue; whether there was room for it.
+/// Puts a record into a queue; `false` when there is no room for it, or when it is longer than any record: nobody could take that out.
 pub(super) fn push(queue: &mut Producer<u8>, at: KernelTime, kind: Kind, bytes: &[u8]) -> bool {
-    let Ok(len) = u16::try_from(bytes.len()) else { return false };
+    let len = u16::try_from(bytes.len()).ok().filter(|len| usize::from(*len) <= FRAME_LEN_MAX);
+    let Some(len) = len else { return false };
     let needed = HEAD_LEN + bytes.len();
     // What the recorder thread has taken lately is only looked at when it is needed: its counter is in another core's cache.
     if queue.cached_slots() < needed && queue.slots() < needed {
@@ -184,15 +185,27 @@ mod tests {
 
     #[test]
     fn record_without_room_is_refused_as_a_whole() {
+        let (mut queue, records) = RingBuffer::new(2 * RECORD_LEN_MAX);
+        let mut records = Records::new(records);
+        let mut buffer = [0; FRAME_LEN_MAX];
+        let kind = Kind::Frame(Side::North);
+        assert!(
+            !push(&mut queue, KernelTime(1), kind, &[0; FRAME_LEN_MAX + 1]),
+            "there is room, but not for one so long"
+        );
+        assert!(push(&mut queue, KernelTime(2), kind, &[7; FRAME_LEN_MAX]));
+        assert_eq!(
+            records.take(&mut buffer).map(|(head, bytes)| (head.at, bytes.len())),
+            Some((KernelTime(2), FRAME_LEN_MAX))
+        );
+
         let (mut queue, records) = RingBuffer::new(2 * HEAD_LEN + 10);
         let mut records = Records::new(records);
-        let kind = Kind::Frame(Side::North);
         assert!(push(&mut queue, KernelTime(1), kind, &[1; 5]));
         assert!(!push(&mut queue, KernelTime(2), kind, &[2; 6]));
         assert!(push(&mut queue, KernelTime(3), kind, &[3; 5]));
         assert!(!push(&mut queue, KernelTime(4), kind, &[]));
         assert!(!push(&mut queue, KernelTime(5), kind, &[0; 70_000]), "longer than any record");
-        let mut buffer = [0; FRAME_LEN_MAX];
         for (at, byte) in [(1, 1), (3, 3)] {
             let (head, bytes) = records.take(&mut buffer).expect("a record");
             assert_eq!((head.at, bytes), (KernelTime(at), &[byte; 5][..]));

@@ -53,20 +53,6 @@ fn fields(assemblies: &Assemblies) -> [Vec<(u16, Placed)>; 2] {
         .map(|placed| placed.into_iter().zip(&mut numbers).map(|(field, number)| (number, field)).collect())
 }
 
-/// The code of a data type of the fields.
-fn data_type(kind: &str) -> u8 {
-    match kind {
-        "INT" => 0xC3,
-        "DINT" => 0xC4,
-        "LINT" => 0xC5,
-        "USINT" => 0xC6,
-        "UINT" => 0xC7,
-        "UDINT" => 0xC8,
-        "BYTE" => 0xD1,
-        kind => unreachable!("no field has the data type {kind}"),
-    }
-}
-
 /// A parameter for each field: its name, data type and description.
 pub(super) fn field_parameters(w: &mut Writer, assemblies: &Assemblies) {
     for (number, field) in fields(assemblies).iter().flatten() {
@@ -77,9 +63,8 @@ pub(super) fn field_parameters(w: &mut Writer, assemblies: &Assemblies) {
         let whole = Some(field.description).filter(|text| text.len() <= HELP_MAX);
         let help = whole.or_else(|| field.description.split([':', '.', ';']).next()).unwrap_or_default();
         let help = if help.len() <= HELP_MAX { help } else { "" };
-        let size = u16::try_from(field.len).unwrap_or(0);
         let range = [Field::Empty, Field::Empty, Field::Number(0)];
-        super::entry(w, *number, (data_type(field.kind), size), [&name, "", help], range);
+        super::parameter(w, *number, field.kind, [&name, "", help], range);
     }
 }
 
@@ -189,20 +174,21 @@ const _: () = assert!(RUN_IDLE_LEN == 4 && CONFIGURATION_POINT == 151);
 #[cfg(test)]
 mod tests {
     use profile_cip::assembly::field::{InputField, OutputField};
-    use profile_cip::assembly::layout::Layout;
+    use profile_cip::assembly::{DriveMode, Layout};
 
     use super::*;
 
     #[test]
-    fn every_field_has_a_data_type() {
-        let own = OutputField::ALL
-            .iter()
-            .map(|field| field.kind())
-            .chain(InputField::ALL.iter().map(|field| field.kind()));
-        let speed = Assemblies::new(Layout::shipped("speed").unwrap(), 1).unwrap();
+    fn every_field_has_a_data_type_of_its_size() {
+        let output = OutputField::ALL.iter().map(|field| (field.kind(), field.size()));
+        let input = InputField::ALL.iter().map(|field| (field.kind(), field.size()));
+        let speed = Layout::shipped("speed-torque").unwrap().with_torque(DriveMode::Speed, 0);
+        let speed = Assemblies::new(speed, 1).unwrap();
         let fields = [speed.output(), speed.input()].concat();
-        for kind in own.chain(fields.iter().map(|field| field.kind)) {
-            assert!((0xC3..=0xD1).contains(&data_type(kind)), "{kind}");
+        let fields = fields.iter().map(|field| (field.kind, field.len));
+        for (kind, len) in output.chain(input).chain(fields) {
+            let (code, size) = super::super::data_type(kind);
+            assert!(code != 0 && usize::from(size) == len, "{kind}");
         }
     }
 }

@@ -39,9 +39,16 @@ const REVISION: &str = "1.1";
 /// Packet interval a tool proposes, in microseconds, as near as the device takes it: slow enough for any host.
 const RPI_PROPOSED_US: u32 = 8000;
 
-/// CIP data types of parameters.
-const UINT: u8 = 0xC7;
-const UDINT: u8 = 0xC8;
+/// Data types of parameters: name, code and bytes.
+const DATA_TYPES: [(&str, u8, u16); 7] = [
+    ("INT", 0xC3, 2),
+    ("DINT", 0xC4, 4),
+    ("LINT", 0xC5, 8),
+    ("USINT", 0xC6, 1),
+    ("UINT", 0xC7, 2),
+    ("UDINT", 0xC8, 4),
+    ("BYTE", 0xD1, 1),
+];
 
 /// Numbers of the parameters that the connection refers to.
 const PARAM_RPI: u16 = 1;
@@ -137,35 +144,36 @@ fn parameters(w: &mut Writer, adapter: &AdapterConfig) {
     let rpi =
         [motion.rpi_min_us, motion.acceptable_rpi_us(u32::MAX), motion.acceptable_rpi_us(RPI_PROPOSED_US)];
     let interval = if adapter.assembly.is_some() { "Packet interval" } else { "Controller Update Period" };
-    param(w, PARAM_RPI, UDINT, (interval, "us"), rpi);
+    parameter(w, PARAM_RPI, "UDINT", [interval, "us", ""], rpi.map(Field::Number));
     if let Some(assemblies) = &adapter.assembly {
         assembly::field_parameters(w, assemblies);
         return;
     }
     let size = |most: u16| {
         let (least, most) = motion.sizes(most);
-        [data_size(least), data_size(most), data_size(most)]
+        [data_size(least), data_size(most), data_size(most)].map(Field::Number)
     };
     let (o_to_t, t_to_o) = (size(motion.o_to_t_size_max), size(motion.t_to_o_size_max));
-    param(w, PARAM_O_TO_T_SIZE, UINT, ("Controller-to-Device size", "bytes"), o_to_t);
-    param(w, PARAM_T_TO_O_SIZE, UINT, ("Device-to-Controller size", "bytes"), t_to_o);
+    parameter(w, PARAM_O_TO_T_SIZE, "UINT", ["Controller-to-Device size", "bytes", ""], o_to_t);
+    parameter(w, PARAM_T_TO_O_SIZE, "UINT", ["Device-to-Controller size", "bytes", ""], t_to_o);
 }
 
-/// A parameter that only the sheet has: least, greatest and proposed value.
-fn param(w: &mut Writer, number: u16, data_type: u8, (name, unit): (&str, &str), range: [u32; 3]) {
-    let size = if data_type == UDINT { 4 } else { 2 };
-    entry(w, number, (data_type, size), [name, unit, ""], range.map(Field::Number));
+/// Code and bytes of a data type. All types that fields of assemblies have are known; another one has no code and no bytes.
+fn data_type(name: &str) -> (u8, u16) {
+    let found = DATA_TYPES.iter().find(|(known, ..)| *known == name);
+    found.map_or((0, 0), |(_, code, size)| (*code, *size))
 }
 
-/// A parameter of this data type and so many bytes; name, unit and help; least, greatest and proposed value.
-fn entry(w: &mut Writer, number: u16, (data_type, size): (u8, u16), texts: [&str; 3], range: [Field<'_>; 3]) {
+/// A parameter that only the sheet has: name, unit and help; least, greatest and proposed value.
+fn parameter(w: &mut Writer, number: u16, kind: &str, texts: [&str; 3], range: [Field<'_>; 3]) {
+    let (code, size) = data_type(kind);
     let mut fields = vec![
         Field::from(0u16),
         // Link path size and link path: it is no attribute.
         Field::Empty,
         Field::Empty,
         Field::Hex(0, 4),
-        Field::Hex(u32::from(data_type), 2),
+        Field::Hex(u32::from(code), 2),
         Field::from(size),
     ];
     fields.extend(texts.map(Field::Text));

@@ -157,17 +157,9 @@ impl Session {
         let Some(left_out) = self.written.admits(Instant::now(), (axis, order)) else { return };
         let axis = self.shared.names.get(axis).map_or("-", String::as_str);
         let (client, from) = (self.id, self.who);
-        if let Some(parameter) = parameter {
-            match left_out {
-                0 => info!(axis, parameter, client, %from, "local control: {order}"),
-                _ => info!(axis, parameter, client, %from, left_out, "local control: {order}"),
-            }
-            return;
-        }
-        match left_out {
-            0 => info!(axis, client, %from, "local control: {order}"),
-            _ => info!(axis, client, %from, left_out, "local control: {order}"),
-        }
+        // A field without a value is not in the line.
+        let left_out = Some(left_out).filter(|left_out| *left_out > 0);
+        info!(axis, parameter, client, %from, left_out, "local control: {order}");
     }
 
     /// What a request asks the engine for, under the number `id`; or the reply to it.

@@ -191,7 +191,7 @@ impl Run<'_> {
                 self.stream = Some(opened);
                 self.controller.tcp_connected(self.clock.now());
             }
-            // The axes are led by the motion connection, which is still there.
+            // The motion connection controls the axes, which is still there.
             Err(_) if self.controller.is_connected() => self.controller.tcp_closed(self.clock.now()),
             Err(source) => return Err(RunError::Connect { target: self.explicit, source }),
         }

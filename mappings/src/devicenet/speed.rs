@@ -91,14 +91,14 @@ pub(super) fn program(
 /// anybody else.
 fn extended_reports() -> Vec<(BitPattern, Report)> {
     let state = |state: SupervisorState| BitPattern::new(0xFF00, u32::from(state.0) << 8);
-    let led = u32::from((SpeedStatus::CONTROL_FROM_NET | SpeedStatus::REFERENCE_FROM_NET).bits());
+    let by_network = u32::from((SpeedStatus::CONTROL_FROM_NET | SpeedStatus::REFERENCE_FROM_NET).bits());
     let enabled = state(SupervisorState::ENABLED);
     vec![
         (state(SupervisorState::FAULT_STOP), Report::FaultReaction),
         (state(SupervisorState::FAULTED), Report::Faulted),
         (state(SupervisorState::NOT_READY), Report::AwaitingPower),
         (state(SupervisorState::READY), Report::Ready),
-        (BitPattern::new(enabled.mask | led, enabled.value | led), Report::Operating),
+        (BitPattern::new(enabled.mask | by_network, enabled.value | by_network), Report::Operating),
         (state(SupervisorState::STOPPING), Report::Stopping),
     ]
 }

@@ -120,7 +120,7 @@ fn plan(
     Ok(DrivePlan { axis: number, mac: drive.mac, end, program: Arc::new(program), has_list: false, steps })
 }
 
-/// What a drive is led by.
+/// What a drive is controlled by.
 #[derive(Debug, Clone)]
 pub struct Parts {
     /// The box's end of its poll connection.
@@ -133,7 +133,7 @@ pub struct Parts {
     pub steps: Vec<SetupStep>,
 }
 
-/// What a drive is led by.
+/// What a drive is controlled by.
 ///
 /// # Errors
 /// The tables have nothing for it, or its numbers do not fit.

@@ -12,7 +12,7 @@ use crate::engine::bus::devicenet::setup::motion_steps;
 use crate::mapping::devicenet::{DevicenetAxis, DevicenetError, MotionAxis};
 use crate::mapping::{CipScaling, Mapping};
 
-/// What a drive with these modes and counts in a unit is led by.
+/// What a drive with these modes and counts in a unit is controlled by.
 pub(super) fn parts(
     network: &Devicenet,
     drive: &DevicenetDrive,

@@ -15,7 +15,7 @@ use crate::mapping::devicenet::{DevicenetAxis, DevicenetError, SpeedAxis};
 /// Highest SpeedScale and, with a minus, the lowest one that a ratio has room for.
 const SCALE_MAX: u32 = 30;
 
-/// What a drive with this output assembly and SpeedScale is led by.
+/// What a drive with this output assembly and SpeedScale is controlled by.
 pub(super) fn parts(
     drive: &DevicenetDrive,
     axis: &Axis,
