@@ -18,6 +18,11 @@ from page import FAINT, VIEW, Browser
 GAIN = "S-0-0104"
 NOTE = "document.getElementById('parameter-note')?.textContent"
 SAYS = "document.getElementById('parameter-says').textContent"
+# Of a parameter with a name, and of a drive that has taken a value and kept another.
+REPLIES = [
+    ("ok", "notch_frequency=120000 unit=mHz"),
+    ("error", "not-kept: the drive took S-0-0104 = 2.00 and has 1.99 afterwards"),
+]
 
 
 def line(parameter):
@@ -76,6 +81,12 @@ def write(browser, parameter, wanted):
     return browser.value(result)
 
 
+def answered(browser, verdict, rest):
+    """What the page says of a write with this reply."""
+    browser.value(f"parameters.write = {{ id: '{GAIN}' }}; hearWrite('{verdict}', '{rest}')")
+    return browser.value(f"knownOf('{GAIN}').result.text")
+
+
 def log_in(browser, token):
     browser.value("document.getElementById('token').focus()")
     browser.call("Input.insertText", text=token)
@@ -127,6 +138,8 @@ def main():
             browser.until(f"{text(GAIN, 1)}.startsWith('2.50')", "the value is read again")
             report["refused"] = write(browser, GAIN, "0")
             report["after_refused"] = value(GAIN)
+            # Replies as the gateway makes them, of what this drive does not do.
+            report["replies"] = [answered(browser, *reply) for reply in REPLIES]
             # Another one writes: the page shows it within seconds.
             param("write", GAIN, "4")
             began = time.monotonic()

@@ -133,6 +133,8 @@ fn page_reads_and_writes_parameters_of_the_drive() {
         let words = "Refused: S-0-0104: the drive refuses the operation data with 0x7006: operation data is below the minimum";
         assert_eq!(refused, words);
         assert_eq!(report["after_refused"], "2.50");
+        let said = ["Written: 120000.", "Not kept: the drive took S-0-0104 = 2.00 and has 1.99 afterwards"];
+        assert_eq!(report["replies"], serde_json::json!(said));
         assert!(report["seen_after_s"].as_f64().is_some_and(|seconds| seconds < 10.0), "{report}");
         let cells_after = cells(&report["gain_after"]);
         assert_eq!(&cells_after[2], range, "limits stay although only the value is read again");

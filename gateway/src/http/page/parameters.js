@@ -157,7 +157,7 @@ function writeParameter(listed, text) {
     known.result = { text: 'A value is needed.', tone: 'bad' };
   } else {
     known.result = { text: 'The drive is asked …', tone: '' };
-    parameters.write = { id: listed.id, text };
+    parameters.write = { id: listed.id };
     send(`write ${control.axis} ${listed.id} ${text}`);
   }
   showParameters();
@@ -177,8 +177,9 @@ function hearWrite(verdict, rest) {
     const again = report.recommission ? ' The axis cannot be enabled before its drive was commissioned again.' : '';
     known.result = { text: `Kept: ${report.value}, before ${report.before}.${again}`, tone: 'good' };
   } else if (verdict === 'ok') {
-    // A parameter with a name is not read back by the gateway: the next reading compares.
-    known.compare = write.text;
+    // `NAME=VALUE unit=UNIT`: a parameter with a name. The gateway has read it back where the drive lets it be read.
+    const [, value] = /=(\S+)/.exec(rest) || [null, ''];
+    known.result = { text: `Written: ${value}.`, tone: 'good' };
   } else {
     const [, code, why] = /^(\S+): (.*)$/.exec(rest) || [null, '', rest];
     known.result = { text: `${code === 'not-kept' ? 'Not kept' : 'Refused'}: ${why}`, tone: 'bad' };
@@ -201,12 +202,6 @@ function takeParameter({ id, report, refused }, now) {
   known.refused = refused;
   // What was said before, such as limits, stays; a value that cannot be read does not.
   known.report = report ? { ...known.report, ...report } : null;
-  if (report && known.compare !== undefined) {
-    const kept = Number(report.value) === Number(known.compare);
-    known.result = kept ? { text: `Kept: ${report.value}.`, tone: 'good' }
-      : { text: `Not kept: the drive took ${known.compare} and has ${report.value}.`, tone: 'bad' };
-    known.compare = undefined;
-  }
 }
 
 // What is to be read next: rows that nothing is known of with all that the drive says, others again without unit and limits.
