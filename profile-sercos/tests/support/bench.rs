@@ -111,11 +111,12 @@ impl Bench {
         self.line.slaves_mut()[slave].application_mut()
     }
 
-    fn frame(&self, kind: Kind, number: u8, len: usize) -> Vec<u8> {
+    /// A telegram of this cycle with `len` bytes of zero behind its header.
+    pub fn frame(&self, channel: Channel, kind: Kind, number: u8, len: usize) -> Vec<u8> {
         let mut frame = vec![0; HEADER_LEN + len];
         let phase =
             PhaseField::new(self.switching.is_some(), self.count, self.switching.unwrap_or(self.phase));
-        let telegram = TelegramType::new(Channel::Primary, kind, number);
+        let telegram = TelegramType::new(channel, kind, number);
         Header { source: [2; 6], telegram, phase }.emit(&mut frame).unwrap();
         frame
     }
@@ -160,10 +161,10 @@ impl Bench {
     /// A cycle of CP0; gives what came back.
     pub fn scan(&mut self) -> AtRepr {
         self.tick();
-        let mut mdt = self.frame(Kind::Mdt, 0, MDT_LEN);
+        let mut mdt = self.frame(Channel::Primary, Kind::Mdt, 0, MDT_LEN);
         MdtRepr::default().emit(&mut mdt[HEADER_LEN..]).unwrap();
         assert!(self.send(&mut mdt));
-        let mut at = self.frame(Kind::At, 0, AT_LEN);
+        let mut at = self.frame(Channel::Primary, Kind::At, 0, AT_LEN);
         AtRepr::empty(SequenceCounter::START_PRIMARY).emit(&mut at[HEADER_LEN..]).unwrap();
         assert!(self.send(&mut at));
         AtRepr::parse(&at[HEADER_LEN..]).unwrap()
@@ -171,7 +172,7 @@ impl Bench {
 
     fn slots(&mut self) {
         for number in 0..2 {
-            let mut mdt = self.frame(Kind::Mdt, number, cp12::LEN);
+            let mut mdt = self.frame(Channel::Primary, Kind::Mdt, number, cp12::LEN);
             for (index, svc) in self.svc.iter().enumerate() {
                 let place = cp12::place(u16::try_from(index + 1).unwrap()).unwrap();
                 if place.telegram == number {
@@ -182,7 +183,7 @@ impl Bench {
             self.send(&mut mdt);
         }
         for number in 0..2 {
-            let mut at = self.frame(Kind::At, number, cp12::LEN);
+            let mut at = self.frame(Channel::Primary, Kind::At, number, cp12::LEN);
             self.send(&mut at);
             for (index, feedback) in self.feedback.iter_mut().enumerate() {
                 let place = cp12::place(u16::try_from(index + 1).unwrap()).unwrap();
@@ -215,7 +216,7 @@ impl Bench {
     }
 
     fn telegrams(&mut self) -> (Vec<u8>, Vec<u8>) {
-        let mut mdt = self.frame(Kind::Mdt, 0, self.len());
+        let mut mdt = self.frame(Channel::Primary, Kind::Mdt, 0, self.len());
         if self.phase == Phase::CP4 && self.producing {
             self.control = self.control.produced();
         }
@@ -232,7 +233,7 @@ impl Bench {
             bytes.extend(command.torque.to_le_bytes());
             data[connection..connection + CONNECTION].copy_from_slice(&bytes);
         }
-        (mdt, self.frame(Kind::At, 0, self.len()))
+        (mdt, self.frame(Channel::Primary, Kind::At, 0, self.len()))
     }
 
     fn cyclic(&mut self) {
