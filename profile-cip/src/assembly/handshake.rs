@@ -203,59 +203,62 @@ impl Handshake {
     /// Returns what is to be done, and why an order was refused. A refusal is reported once, when it happens.
     pub fn step(&mut self, link: Link, word: Control, axis: Axis) -> (Reaction, Refusal) {
         if link != Link::Run {
-            let enabled = self.state == State::Enabled;
-            *self = Self::default();
-            return (if enabled { Reaction::LOSE } else { Reaction::empty() }, Refusal::NONE);
+            return (self.fall(Reaction::LOSE), Refusal::NONE);
         }
         if word.has_reserved() {
             let news = self.spent != Control::all();
-            let enabled = self.state == State::Enabled;
-            *self = Self::default();
             let refusal = if news { Refusal::RESERVED_BITS } else { Refusal::NONE };
-            return (if enabled { Reaction::DISABLE } else { Reaction::empty() }, refusal);
+            return (self.fall(Reaction::DISABLE), refusal);
         }
         let rising = word - self.spent;
         self.spent = word;
-        let (mut reaction, mut refusal) = (Reaction::empty(), Refusal::NONE);
-        if self.state == State::Enabled && axis.faulted {
+        let (mut reaction, refusal) = self.enable(word, axis.faulted);
+        reaction.set(Reaction::RESET, rising.contains(Control::RESET) && self.state != State::Enabled);
+        reaction.set(Reaction::HALT, word.contains(Control::STOP) && self.state == State::Enabled);
+        if refusal != Refusal::NONE || !rising.contains(Control::START) {
+            return (reaction, refusal);
+        }
+        let refusal = self.refusal_of_start(word, axis.operating);
+        reaction.set(Reaction::START, refusal == Refusal::NONE);
+        (reaction, refusal)
+    }
+
+    /// Everything has to be 0 before it counts again; `reaction` if the axis was enabled.
+    fn fall(&mut self, reaction: Reaction) -> Reaction {
+        let before = core::mem::take(self);
+        if before.state == State::Enabled { reaction } else { Reaction::empty() }
+    }
+
+    /// What ENABLE does, and ends.
+    fn enable(&mut self, word: Control, faulted: bool) -> (Reaction, Refusal) {
+        if self.state == State::Enabled && faulted {
             self.state = State::Locked;
         }
-        match (self.state, word.contains(Control::ENABLE)) {
-            (State::Enabled, false) => {
-                self.state = State::Armed;
-                reaction |= Reaction::DISABLE;
-            }
-            (State::Locked, false) => self.state = State::Armed,
+        let (next, reaction, refusal) = match (self.state, word.contains(Control::ENABLE)) {
+            (State::Enabled, false) => (State::Armed, Reaction::DISABLE, Refusal::NONE),
+            (State::Locked, false) => (State::Armed, Reaction::empty(), Refusal::NONE),
             (State::Armed, true) if word.contains(Control::RESET) => {
-                self.state = State::Locked;
-                refusal = Refusal::RESET_WINS;
+                (State::Locked, Reaction::empty(), Refusal::RESET_WINS)
             }
-            (State::Armed, true) if axis.faulted => {
-                self.state = State::Locked;
-                refusal = Refusal::FAULT;
+            (State::Armed, true) if faulted => (State::Locked, Reaction::empty(), Refusal::FAULT),
+            (State::Armed, true) => (State::Enabled, Reaction::ENABLE, Refusal::NONE),
+            (state @ (State::Enabled | State::Locked), true) | (state @ State::Armed, false) => {
+                (state, Reaction::empty(), Refusal::NONE)
             }
-            (State::Armed, true) => {
-                self.state = State::Enabled;
-                reaction |= Reaction::ENABLE;
-            }
-            (State::Enabled | State::Locked, true) | (State::Armed, false) => {}
-        }
-        if rising.contains(Control::RESET) && self.state != State::Enabled {
-            reaction |= Reaction::RESET;
-        }
-        if self.state == State::Enabled && word.contains(Control::STOP) {
-            reaction |= Reaction::HALT;
-        }
-        if rising.contains(Control::START) && refusal == Refusal::NONE {
-            if self.state != State::Enabled || !axis.operating {
-                refusal = Refusal::NOT_ENABLED;
-            } else if word.contains(Control::STOP) {
-                refusal = Refusal::STOP_WINS;
-            } else {
-                reaction |= Reaction::START;
-            }
-        }
+        };
+        self.state = next;
         (reaction, refusal)
+    }
+
+    /// Why a START that became 1 starts nothing.
+    fn refusal_of_start(&self, word: Control, operating: bool) -> Refusal {
+        if self.state != State::Enabled || !operating {
+            Refusal::NOT_ENABLED
+        } else if word.contains(Control::STOP) {
+            Refusal::STOP_WINS
+        } else {
+            Refusal::NONE
+        }
     }
 
     /// The axis could not be enabled: ENABLE has to be 0 before it counts again.

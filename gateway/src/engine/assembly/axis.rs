@@ -150,6 +150,15 @@ impl PlcAxis {
         if !axis.operates() {
             (self.source, self.followed, self.last, self.torque) = (Source::None, None, None, None);
         }
+        let reaction = self.shake(around, axis, output);
+        self.react(around, axis, reaction);
+        self.enable(around, axis);
+        self.run(around, axis, output, reaction);
+        self.generate(around, axis);
+    }
+
+    /// A step of the handshake, and what of the word is refused.
+    fn shake(&mut self, around: &Around<'_>, axis: &AxisChannel, output: &AxisOutput) -> Reaction {
         let known = Axis { faulted: is_faulted(axis), operating: axis.operates() };
         let before = self.handshake.state();
         let (reaction, refusal) = self.handshake.step(around.link, output.control, known);
@@ -159,21 +168,8 @@ impl PlcAxis {
         if !output.control.contains(Control::START) {
             self.start_taken = false;
         }
-        if reaction.contains(Reaction::LOSE) {
-            self.lose(around, axis);
-        }
-        if reaction.contains(Reaction::DISABLE) {
-            self.disable(around, axis);
-        }
-        if reaction.contains(Reaction::RESET) {
+        if reaction.intersects(Reaction::RESET | Reaction::ENABLE) {
             self.refusal = Refusal::NONE;
-            let reset = AxisCommand { request: Some(Request::FaultReset), ..AxisCommand::default() };
-            self.send(around, axis, reset);
-        }
-        if reaction.contains(Reaction::ENABLE) {
-            (self.refusal, self.enabling, self.begun, self.has_operated) =
-                (Refusal::NONE, Some(now), None, false);
-            (self.target, self.done) = (None, false);
         }
         // What was refused of the same word is shown, whatever else of it was carried out.
         if refusal != Refusal::NONE {
@@ -184,15 +180,44 @@ impl PlcAxis {
         {
             self.refusal = refusal;
         }
-        self.enable(around, axis);
-        if self.handshake.state() != State::Enabled && !is_faulted(axis) && axis.operates() {
+        reaction
+    }
+
+    /// Carries out what the handshake says, without what needs an axis in operation.
+    fn react(&mut self, around: &Around<'_>, axis: &mut AxisChannel, reaction: Reaction) {
+        if reaction.contains(Reaction::LOSE) {
+            self.lose(around, axis);
+        }
+        if reaction.contains(Reaction::DISABLE) {
+            self.disable(around, axis);
+        }
+        if reaction.contains(Reaction::RESET) {
+            let reset = AxisCommand { request: Some(Request::FaultReset), ..AxisCommand::default() };
+            self.send(around, axis, reset);
+        }
+        if reaction.contains(Reaction::ENABLE) {
+            (self.enabling, self.begun, self.has_operated) = (Some(around.now.0), None, false);
+            (self.target, self.done) = (None, false);
+        }
+    }
+
+    /// What an axis in operation does: nothing without ENABLE.
+    fn run(
+        &mut self,
+        around: &Around<'_>,
+        axis: &mut AxisChannel,
+        output: &AxisOutput,
+        reaction: Reaction,
+    ) {
+        if !axis.operates() {
+            return;
+        }
+        if self.handshake.state() == State::Enabled {
+            self.operate(around, axis, output, reaction);
+        } else if !is_faulted(axis) {
             // Held after a lost command, and the fault was reset: nobody wants the torque.
             self.disable(around, axis);
         }
-        if self.handshake.state() == State::Enabled && axis.operates() {
-            self.operate(around, axis, output, reaction);
-        }
-        self.generate(around, axis);
     }
 
     /// How the axis stops is what the configuration says from the moment at which a controller has it.
