@@ -153,7 +153,7 @@ impl PlcAxis {
         let reaction = self.shake(around, axis, output);
         self.react(around, axis, reaction);
         self.enable(around, axis);
-        self.run(around, axis, output, reaction);
+        self.in_operation(around, axis, output, reaction);
         self.generate(around, axis);
     }
 
@@ -202,7 +202,7 @@ impl PlcAxis {
     }
 
     /// What an axis in operation does: nothing without ENABLE.
-    fn run(
+    fn in_operation(
         &mut self,
         around: &Around<'_>,
         axis: &mut AxisChannel,
