@@ -8,3 +8,4 @@ mod engineering_files;
 mod mistakes;
 mod schema_values;
 mod schemas;
+mod sizes;

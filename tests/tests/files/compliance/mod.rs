@@ -9,7 +9,8 @@ use axisbridge::mapping::Mapping;
 
 use self::attributes::{by_clause, with_numbers};
 use self::clauses::Table;
-use self::named_tests::{named_tests, root, why_not};
+pub use self::named_tests::root;
+use self::named_tests::{named_tests, why_not};
 
 /// A page in `docs/` and how many tests it names at least: fewer are a page that is not read rightly.
 const PAGES: [(&str, usize); 4] =
