@@ -267,6 +267,30 @@ fn a_plc_enables_an_axis_moves_it_and_takes_its_torque_away() {
     assert_eq!(plc.state(), DriveState::Ready);
 }
 
+/// On the way to operation and in it: one interval after ENABLE was taken back the torque is off, and it stays off.
+#[test]
+fn torque_ends_whenever_enable_is_taken_back() {
+    let mut states = Vec::new();
+    for scans in 1..=6 {
+        let mut plc = plc("{}");
+        plc.connect();
+        plc.word(Control::empty());
+        plc.run_for(40);
+        plc.word(Control::ENABLE);
+        (0..scans).for_each(|_| plc.scan());
+        states.push(plc.state());
+        plc.word(Control::empty());
+        let end = plc.rig.now();
+        plc.run_for(400);
+        let [(_, true), (off, false)] = plc.rig.watched[0].changes[..] else {
+            panic!("{scans}: {:?}", plc.rig.watched[0].changes)
+        };
+        assert!((end..=end + RPI).contains(&off), "{scans}: {off:?} behind {end:?}");
+    }
+    assert_eq!(states[..2], [DriveState::Starting; 2]);
+    assert_eq!(states[5], DriveState::Operating);
+}
+
 #[test]
 fn stop_brakes_with_torque_and_wins_over_start() {
     let mut plc = in_motion();
@@ -428,9 +452,20 @@ fn orders_that_cannot_be_carried_out_are_refused_with_their_reason() {
     plc.connect();
     plc.word(Control::empty());
     plc.run_for(20);
-    plc.word(Control::START);
-    plc.run_for(20);
-    assert_eq!(plc.refusal(), Refusal::NOT_ENABLED);
+    // What was refused is shown until RESET or ENABLE.
+    for forgets in [Control::RESET, Control::ENABLE] {
+        plc.word(Control::empty());
+        plc.run_for(20);
+        plc.word(Control::START);
+        plc.run_for(20);
+        assert_eq!(plc.refusal(), Refusal::NOT_ENABLED);
+        plc.word(Control::empty());
+        plc.run_for(200);
+        assert_eq!(plc.refusal(), Refusal::NOT_ENABLED);
+        plc.word(forgets);
+        plc.run_for(20);
+        assert_eq!(plc.refusal(), Refusal::NONE, "{forgets:?}");
+    }
     plc.enable();
     for (target, velocity, acceleration, refusal) in [
         (TURN, 21 * TURN, 0, Refusal::TOO_FAST),
