@@ -17,6 +17,8 @@ from page import FAINT, VIEW, Browser
 
 GAIN = "S-0-0104"
 NOTE = "document.getElementById('parameter-note')?.textContent"
+# Of a drive on CANopen and one on DeviceNet: axis, parameter, new value.
+OTHERS = [("slide", "6081:00", "1234"), ("spindle", "66.1.504", "150")]
 SAYS = "document.getElementById('parameter-says').textContent"
 # Of a parameter with a name, and of a drive that has taken a value and kept another.
 REPLIES = [
@@ -38,17 +40,17 @@ def form(parameter):
     return f"({line(parameter)}?.querySelector('form')?.checkVisibility() ?? false)"
 
 
-def param(word, *rest):
+def param(word, *rest, axis="turntable"):
     """The drive as another process sees it."""
-    command = [sys.argv[5], "param", word, "turntable", *rest, "--local", sys.argv[6]]
+    command = [sys.argv[5], "param", word, axis, *rest, "--local", sys.argv[6]]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
     if done.returncode:
         raise SystemExit(f"{command}: {done.stdout}{done.stderr}")
     return done.stdout
 
 
-def value(parameter):
-    return json.loads(param("read", parameter, "--json"))["value"]
+def value(parameter, axis="turntable"):
+    return json.loads(param("read", parameter, "--json", axis=axis))["value"]
 
 
 def show(browser, axis, parameter):
@@ -91,6 +93,10 @@ def log_in(browser, token):
     browser.value("document.getElementById('token').focus()")
     browser.call("Input.insertText", text=token)
     browser.key("Enter", 13, "\r")
+    take_control(browser)
+
+
+def take_control(browser):
     browser.until("!document.getElementById('take-control').disabled", "control is offered")
     browser.value("document.getElementById('take-control').focus()")
     browser.key("Enter", 13, "\r")
@@ -174,9 +180,16 @@ def main():
             browser.until("control.state !== 'operating'", "no torque")
 
             report["others"] = {}
-            for axis, parameter in (("slide", "6081:00"), ("spindle", "66.1.504")):
+            for axis, parameter, wanted in OTHERS:
                 show(browser, axis, parameter)
-                report["others"][axis] = row(browser, parameter)
+                seen = report["others"][axis] = row(browser, parameter)
+                seen["form_without_control"] = browser.value(form(parameter))
+                take_control(browser)
+                browser.until(form(parameter), "a field for the new value")
+                seen["before"] = value(parameter, axis)
+                seen["said"] = write(browser, parameter, wanted)
+                seen["after"] = value(parameter, axis)
+                browser.until(f"{text(parameter, 1)}.startsWith('{seen['after']}')", "the value is read again")
             report["complaints"], report["requests"] = browser.complaints, browser.requests
         finally:
             browser.process.kill()

@@ -7,6 +7,7 @@
 pub mod can_frames;
 pub mod can_kernel;
 pub mod can_led;
+pub mod example;
 pub mod expected;
 pub mod fuzz;
 pub mod host;

@@ -6,6 +6,7 @@ use std::net::SocketAddrV4;
 use profile_cia402::master::boot::BootStatus;
 use profile_cia402::master::event::Event as CanEvent;
 use profile_cia402::wire::NodeId;
+use profile_cip::assembly::Refusal;
 use profile_cip::device::axis_object::refused::RefusedRequest;
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::device::fault_log::{LogEntry, LogKind};
@@ -65,6 +66,13 @@ pub enum Notice {
         axis: u8,
         /// Which, and why.
         refused: RefusedRequest,
+    },
+    /// An order in the output assembly was refused. Not every layout of the input assembly has a place for the reason.
+    OrderRefused {
+        /// Number of the axis: its place in the configuration, from 0.
+        axis: u8,
+        /// Why.
+        refusal: Refusal,
     },
     /// A drive on DeviceNet answers, and its answers do not count.
     SlaveAnswers {
@@ -503,6 +511,7 @@ impl Notice {
             | Self::NodeProgram { axis, .. }
             | Self::ModesTried { axis, .. }
             | Self::Refused { axis, .. }
+            | Self::OrderRefused { axis, .. }
             | Self::NotMapped { axis, .. }
             | Self::Period { axis, .. }
             | Self::ModesLeftOut { axis, .. }
@@ -569,6 +578,7 @@ impl Notice {
             Self::Waiting { .. } => "wait",
             Self::Fault { .. } | Self::DriveSays { .. } | Self::Logged { .. } | Self::Node { .. } => "fault",
             Self::Refused { .. }
+            | Self::OrderRefused { .. }
             | Self::Strangers { .. }
             | Self::NotEqual { .. }
             | Self::NotKept { .. }
@@ -673,6 +683,9 @@ impl fmt::Display for Notice {
                 write!(f, "node {node} keeps its PDOs, and {} is in none that can be used: the axis works without", all.join(", "))
             }
             Self::Refused { refused, .. } => write!(f, "{refused}"),
+            Self::OrderRefused { refusal, .. } => {
+                write!(f, "what the controller orders in the output assembly is refused: {refusal}")
+            }
             Self::ModesTried { node, tried, .. } => write!(f, "node {node}: {tried}"),
             Self::PassedOver { failures, .. } => {
                 let all = failures.iter().map(|failure| (failure.what, failure.idn, failure.failure));

@@ -133,7 +133,9 @@ impl Scribe {
 /// What the line of a notice counts as, where a controller can have as many of them as it likes.
 const fn limited(notice: &Notice) -> Option<(LineKind, Peer)> {
     match notice {
-        Notice::Refused { axis, .. } => Some((LineKind::Request, Peer::Axis(*axis))),
+        Notice::Refused { axis, .. } | Notice::OrderRefused { axis, .. } => {
+            Some((LineKind::Request, Peer::Axis(*axis)))
+        }
         Notice::NotEqual { axis, .. }
         | Notice::NotKept { axis, .. }
         | Notice::DriveRefuses { axis, .. }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use axisbridge_tests::example::two_axes;
 use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::{Running, axisbridge};
 
@@ -18,10 +19,7 @@ fn file(name: &str, text: &str) -> PathBuf {
 /// that the box is asked to end. Gives the box and its log.
 fn turning(name: &str, octet: u8, seconds: u64) -> (Running, Running, PathBuf) {
     let (device, controller) = (format!("127.0.0.{octet}"), format!("127.0.1.{octet}"));
-    let example = include_str!("../../../examples/two-axes-in-process.toml");
-    let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
-    let mut text = example.replace("127.0.0.2", &device);
-    text.replace_range(modbus, "");
+    let text = two_axes(&device, "");
     assert!(text.contains("acceleration = 200.0"), "the example limits the turntable");
     let text = text.replace("acceleration = 200.0", "acceleration = 0.2");
     let config = file(&format!("{name}.toml"), &text);

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use axisbridge_tests::example::two_axes;
 use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::{Running, axisbridge};
 use serde_json::Value;
@@ -17,13 +18,9 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// The fault that the drive has when its following error exceeds its monitoring window.
 const FAULT: &str = "excessive_position_error";
 
-/// The example on an address of its own, with a directory for the history, on a bus that survives pauses of a busy host.
+/// The example on an address of its own, with a directory for the history.
 fn configuration(device: &str, directory: &str) -> String {
-    let example = include_str!("../../../examples/two-axes-in-process.toml");
-    let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
-    let mut text = example.replace("127.0.0.2", device).replace("allowed_losses = 4", "allowed_losses = 500");
-    text.replace_range(modbus, &format!("[history]\ndirectory = \"{directory}\"\n\n"));
-    text
+    two_axes(device, &format!("[history]\ndirectory = \"{directory}\"\n\n"))
 }
 
 /// What a command that is a client of the gateway prints, and its exit status.

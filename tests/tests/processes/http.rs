@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use axisbridge_tests::example::two_axes;
 use axisbridge_tests::host::{alone_in_real_time, in_real_time};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::axisbridge;
@@ -18,13 +19,9 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// The fault that the drive has when its following error exceeds its monitoring window.
 const FAULT: &str = "excessive_position_error";
 
-/// The example on an address of its own, with HTTP in place of Modbus, on a bus that survives pauses of a busy host.
+/// The example on an address of its own, with HTTP in place of Modbus.
 pub fn configuration(device: &str) -> String {
-    let example = include_str!("../../../examples/two-axes-in-process.toml");
-    let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
-    let mut text = example.replace("127.0.0.2", device).replace("allowed_losses = 4", "allowed_losses = 500");
-    text.replace_range(modbus, "[http]\nlisten = \"127.0.0.1:0\"\nconnections_max = 16\n\n");
-    text
+    two_axes(device, "[http]\nlisten = \"127.0.0.1:0\"\nconnections_max = 16\n\n")
 }
 
 /// The address in the log.

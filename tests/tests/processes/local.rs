@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use axisbridge_tests::example::two_axes;
 use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::{Running, axisbridge};
 
@@ -25,10 +26,7 @@ pub fn path(name: &str) -> PathBuf {
 impl Gateway {
     /// Starts it with two simulated SERCOS drives in its process.
     pub fn start(name: &str, device: &str) -> Self {
-        let example = include_str!("../../../examples/two-axes-in-process.toml");
-        let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
-        let mut text = example.replace("127.0.0.2", device);
-        text.replace_range(modbus, "");
+        let text = two_axes(device, "");
         let modes = "address = 1\nmodes = [\"position\", \"positioning\", \"homing\"]";
         assert_eq!(text.matches("address = 1\n").count(), 1, "{text}");
         Self::with(name, &text.replacen("address = 1", modes, 1))

@@ -148,9 +148,15 @@ fn page_reads_and_writes_parameters_of_the_drive() {
         assert_eq!(report["with_torque"], true);
         assert_eq!(report["wide"], false, "wider than the screen");
         assert_eq!(report["faint"], Value::Array(Vec::new()), "too little contrast");
-        for (axis, id) in [("slide", "6081:00"), ("spindle", "66.1.504")] {
-            let cells = cells(&report["others"][axis]);
+        for (axis, id, after) in [("slide", "6081:00", "1234"), ("spindle", "66.1.504", "150")] {
+            let other = &report["others"][axis];
+            let cells = cells(other);
             assert_eq!((cells[0].as_str(), cells[3].as_str()), (id, "without torque"), "{cells:?}");
+            assert_eq!(other["form_without_control"], false, "{axis}");
+            let before = other["before"].as_str().expect("text");
+            assert_ne!(before, after, "{axis}: the write changes something");
+            assert_eq!(other["said"], format!("Kept: {after}, before {before}."), "{axis}");
+            assert_eq!(other["after"], after, "{axis}: another process reads what the page has written");
         }
         assert_eq!(report["complaints"], Value::Array(Vec::new()), "the console is silent");
         let requests = report["requests"].as_array().expect("a list");

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use axisbridge_tests::example::two_axes;
 use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::process::{Running, axisbridge};
 use axisbridge_tests::{peer, tshark};
@@ -18,14 +19,10 @@ use super::local::{Gateway, path};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The example on an address of its own, with HTTP and a directory, on a bus that survives pauses of a busy host.
+/// The example on an address of its own, with HTTP and a directory.
 fn configuration(device: &str, directory: &str) -> String {
-    let example = include_str!("../../../examples/two-axes-in-process.toml");
-    let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
-    let mut text = example.replace("127.0.0.2", device).replace("allowed_losses = 4", "allowed_losses = 500");
     let tables = format!("[http]\nlisten = \"127.0.0.1:0\"\n\n[history]\ndirectory = \"{directory}\"\n\n");
-    text.replace_range(modbus, &tables);
-    text
+    two_axes(device, &tables)
 }
 
 fn contacts(gateway: &Gateway) -> Vec<Value> {

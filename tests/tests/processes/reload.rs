@@ -5,17 +5,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use axisbridge_tests::example::two_axes;
 use axisbridge_tests::process::{Running, axisbridge};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The example on an address of its own, without Modbus, with an overlay.
 fn configuration() -> String {
-    let example = include_str!("../../../examples/two-axes-in-process.toml");
-    let modbus = example.find("# Status registers").unwrap()..example.find("[[device]]").unwrap();
-    let mut text = example.replace("127.0.0.2", "127.0.0.71");
-    text.replace_range(modbus, "[mappings]\noverlays = [\"own.toml\"]\n\n");
-    text
+    two_axes("127.0.0.71", "[mappings]\noverlays = [\"own.toml\"]\n\n")
 }
 
 fn await_line(log: &Path, from: usize, wanted: &str) -> String {

@@ -503,6 +503,11 @@ impl PlcAxis {
 
     // ---- to the controller -----------------------------------------------------------------------------------------
 
+    /// Why the last order was refused.
+    pub const fn refusal(&self) -> Refusal {
+        self.refusal
+    }
+
     /// What the controller is shown.
     pub fn input(&mut self, around: &Around<'_>, axis: &AxisChannel) -> AxisInput {
         let now = around.now.0;

@@ -18,7 +18,7 @@ mod parameters;
 use std::net::{Ipv4Addr, SocketAddrV4};
 
 use profile_cip::assembly::layout::ASSEMBLY_LEN_MAX;
-use profile_cip::assembly::{Assemblies, Link, Scale};
+use profile_cip::assembly::{Assemblies, Link, Refusal, Scale};
 use profile_cip::device::motion_link::{ExplicitReply, ExplicitRequest, MotionReply, MotionRequest, Token};
 use profile_cip::device::objects::ac_dc_drive::{self, VALUE_LEN};
 use profile_cip::device::objects::assembly::is_data;
@@ -264,7 +264,12 @@ impl North for AssemblyChannel {
             let axis = &mut axes[member.number];
             let output = data.and_then(|data| self.assemblies.output_of(place, data, member.scale).ok());
             let output = output.unwrap_or_default();
+            let shown = member.refusal();
             member.follow(&around, axis, &output);
+            let (number, refusal) = (u8::try_from(member.number).unwrap_or(u8::MAX), member.refusal());
+            if refusal != shown && refusal != Refusal::NONE {
+                notice(Notice::OrderRefused { axis: number, refusal });
+            }
             let values = member.input(&around, axis);
             // The length is that of the assembly.
             let _ = self.assemblies.put_input(place, &values, member.scale, &mut self.input);

@@ -27,8 +27,6 @@ pub enum Access {
 pub enum Backing {
     /// In the device; the owner of the device may publish values with `put_attribute`.
     Stored,
-    /// In the device, and every Set is carried to the drive before it is acknowledged.
-    WriteThrough,
     /// In the drive: every Get and Set is carried to it.
     Drive,
     /// In the process image of the drive: a Get is carried to the owner of the device like one of [`Backing::Drive`], and

@@ -238,8 +238,7 @@ mod tests {
             backing,
             ..AttributeDefinition::new(Scope::Instance, id, DataType::Udint, Access::Set, "an attribute")
         };
-        let definitions =
-            [new(500, Backing::Stored), new(501, Backing::WriteThrough), new(502, Backing::Drive)];
+        let definitions = [new(500, Backing::Stored), new(501, Backing::Drive), new(502, Backing::Drive)];
         AttributeTable::new(Scope::Instance, &definitions).expect("a table")
     }
 
@@ -302,13 +301,13 @@ mod tests {
 
     #[test]
     fn a_get_asks_the_drive_only_for_what_lives_there() {
-        let body = [2, 0, 0, 0, 0xF5, 1, 0, 4, 0xF6, 1, 0, 4];
+        let body = [2, 0, 0, 0, 0xF4, 1, 0, 4, 0xF6, 1, 0, 4];
         let mut rig = Rig::new(ListFormat::AxisGet, &body);
         assert_eq!(rig.run(), None);
         let access = rig.worker.take_access().expect("an access");
         assert_eq!((access.id, access.operation), (502, AccessOperation::Read(4)));
         assert!(rig.complete(access.ticket, Ok(&[9, 8, 7, 6])));
-        let body = vec![2, 0, 0, 0, 0xF5, 1, 0, 4, 0, 0, 0, 0, 0xF6, 1, 0, 4, 9, 8, 7, 6];
+        let body = vec![2, 0, 0, 0, 0xF4, 1, 0, 4, 0, 0, 0, 0, 0xF6, 1, 0, 4, 9, 8, 7, 6];
         assert_eq!(rig.run(), Some((GeneralStatus::SUCCESS, body)));
     }
 
