@@ -1,4 +1,4 @@
-"""Validates TOML files against JSON Schemas with jsonschema (PyPI).
+"""Validates TOML files against JSON Schemas with jsonschema, and many small documents with jsonschema-rs, which is forty times as fast (both PyPI).
 
 Usage: json_schema.py FOLDER [FILE.toml SCHEMA good|bad]...
        json_schema.py --documents SCHEMA.json DOCUMENTS.json
@@ -12,21 +12,22 @@ import sys
 import tomllib
 from pathlib import Path
 
-from jsonschema import Draft7Validator
-
 
 def documents(schema: str, file: str) -> int:
-    schema = json.loads(Path(schema).read_text())
-    Draft7Validator.check_schema(schema)
-    validator = Draft7Validator(schema)
-    first = (next(validator.iter_errors(document), None) for document in json.loads(Path(file).read_text()))
-    print(json.dumps([error and f"{list(error.path)}: {error.message[:200]}" for error in first]))
+    from jsonschema_rs import Draft7Validator
+
+    # It refuses a schema that is none.
+    validator = Draft7Validator(json.loads(Path(schema).read_text()))
+    first = (next(iter(validator.iter_errors(document)), None) for document in json.loads(Path(file).read_text()))
+    print(json.dumps([error and f"{error.instance_path}: {error.message[:200]}" for error in first]))
     return 0
 
 
 def main() -> int:
     if sys.argv[1] == "--documents":
         return documents(*sys.argv[2:])
+    from jsonschema import Draft7Validator
+
     folder = Path(sys.argv[1])
     unexpected = 0
     for file, name, expected in zip(sys.argv[2::3], sys.argv[3::3], sys.argv[4::3]):

@@ -1,5 +1,5 @@
 //! The schema of a configuration and the program refuse the same values: every key, with values on both sides of every border,
-//! judged by the program and by another maker's validator (jsonschema, PyPI).
+//! judged by the program and by another maker's validator (jsonschema-rs, PyPI).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -262,7 +262,7 @@ fn changed(document: &Value, place: &str, others: Vec<Value>) -> Vec<(String, Va
 
 #[test]
 fn the_schema_and_the_program_refuse_the_same_values() {
-    let Some(python) = peer::python_or_skip("schema values", "jsonschema") else { return };
+    let Some(python) = peer::python_or_skip("schema values", "jsonschema_rs") else { return };
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
     let schema = schema("config", &mapping).expect("the schema");
     let mut probes: Vec<(String, Value)> = Vec::new();
@@ -308,7 +308,7 @@ fn the_schema_and_the_program_refuse_the_same_values() {
 /// of another kind.
 #[test]
 fn the_schema_of_scripts_agrees_with_the_program() {
-    let Some(python) = peer::python_or_skip("schema values", "jsonschema") else { return };
+    let Some(python) = peer::python_or_skip("schema values", "jsonschema_rs") else { return };
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
     let schema = schema("script", &mapping).expect("the schema");
     let program = |document: &Value| {
@@ -420,7 +420,7 @@ fn row(document: &Value, at: &str) -> Value {
 /// Every key of the tables that takes words of a list: with another word the program refuses the table, and the schema does.
 #[test]
 fn words_of_the_tables_are_those_of_the_schemas() {
-    let Some(python) = peer::python_or_skip("schema values", "jsonschema") else { return };
+    let Some(python) = peer::python_or_skip("schema values", "jsonschema_rs") else { return };
     let mapping = Mapping::embedded().expect("the shipped tables are sound");
     let tables = Path::new(env!("CARGO_MANIFEST_DIR")).join("../mappings/tables");
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("schema-words");

@@ -16,7 +16,7 @@ mod synchronous;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use axisbridge_tests::host::in_real_time;
@@ -27,12 +27,27 @@ use axisbridge_tests::process::{Running, axisbridge};
 /// Set for the copy of this test binary that reads the Modbus map inside the gateway's namespace.
 const MODBUS_ADDRESS: &str = "AXISBRIDGE_TEST_MODBUS";
 
-/// Buses share the processors: a second one in real time would be a fault of the first one's making.
-static ONE_BUS: Mutex<()> = Mutex::new(());
+/// Buses share the processors: a fourth one in real time would be a fault of the others' making.
+static BUSES: (Mutex<u32>, Condvar) = (Mutex::new(3), Condvar::new());
 
-/// The right to run a bus. A test that failed with it has left nothing behind.
-fn one_bus() -> MutexGuard<'static, ()> {
-    ONE_BUS.lock().unwrap_or_else(PoisonError::into_inner)
+/// The right to run a bus.
+struct Bus;
+
+/// Waits for the right to run a bus.
+fn one_bus() -> Bus {
+    let (free, freed) = &BUSES;
+    let free = free.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut free = freed.wait_while(free, |free| *free == 0).unwrap_or_else(PoisonError::into_inner);
+    *free -= 1;
+    Bus
+}
+
+impl Drop for Bus {
+    fn drop(&mut self) {
+        let (free, freed) = &BUSES;
+        *free.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+        freed.notify_one();
+    }
 }
 
 fn in_namespace(namespace: &Namespace, arguments: &[&str]) -> Command {
