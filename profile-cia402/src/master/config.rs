@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use profile_generic::can::Id;
-use profile_generic::time::DurationNs;
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 use crate::sdo::request::SdoData;
 pub use crate::wire::pdo::Direction;
@@ -440,6 +440,11 @@ pub enum PdoError {
 }
 
 impl MasterConfig {
+    /// When a device is given up that is asked from this moment on.
+    pub(super) fn gives_up_at(&self, asked: MonotonicTime) -> Option<MonotonicTime> {
+        (self.boot_time > DurationNs::ZERO).then(|| asked + self.boot_time)
+    }
+
     /// Whether the network is possible.
     ///
     /// # Errors

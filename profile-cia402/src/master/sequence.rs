@@ -58,8 +58,7 @@ impl Master {
                 // One that may stay in operation reports its state when it is asked, and has to be asked from then on.
                 station.guard_at = node.guarding.filter(|_| keep).map(|_| now);
                 station.deadline = Some(now + config.boot_up_time);
-                station.give_up = (config.boot_time > DurationNs::ZERO)
-                    .then(|| now + config.boot_up_time + config.boot_time);
+                station.give_up = config.gives_up_at(now + config.boot_up_time);
             }
             BootState::Identify => {
                 station.report.clear();
@@ -67,6 +66,14 @@ impl Master {
                 (station.configured, station.nmt) = (false, None);
                 if event == BootEvent::BootUp {
                     (station.kept, station.status) = (false, None);
+                }
+                // One that was reset has its time since then.
+                station.give_up = station.give_up.or(config.gives_up_at(now));
+                // One that did not answer may be stopped, and then has no SDO: a boot-up message can cross the stop that a lost
+                // device is sent. One that may be in operation is left alone, unless it says that it is stopped.
+                let stopped = station.heartbeat == Some(NmtState::STOPPED);
+                if last == BootState::Retry && event == BootEvent::Elapsed && (stopped || !node.keep_alive) {
+                    station.nmt = Some(NmtCommand::ENTER_PRE_OPERATIONAL);
                 }
             }
             BootState::Retry => {

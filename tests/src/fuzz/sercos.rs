@@ -130,6 +130,8 @@ struct Line {
     master: Master,
     drives: axisbridge::simulate::drives::DriveNetwork,
     now: MonotonicTime,
+    /// A slave was read as one that cannot take part: only a new scan reads it again.
+    misread: bool,
 }
 
 impl Line {
@@ -145,12 +147,12 @@ impl Line {
         let mut master = Master::new(config).expect("a possible network");
         master.set_target_phase(Phase::CP4);
         let drives = drives([(1, UnitKind::Rotary), (2, UnitKind::Linear)], false);
-        Self { master, drives, now: MonotonicTime(1_000_000_000) }
+        Self { master, drives, now: MonotonicTime(1_000_000_000), misread: false }
     }
 
     /// A cycle: `out` is the way to the drives, `back` the way from them.
     fn cycle(&mut self, out: &mut Disturber<'_>, back: &mut Disturber<'_>) {
-        let Self { master, drives, now } = self;
+        let Self { master, drives, now, misread } = self;
         *now = (*now).max(master.wake_at().unwrap_or(*now + DurationNs::from_millis(1)));
         drives.handle_time(*now);
         let mut frames = Vec::new();
@@ -169,14 +171,21 @@ impl Line {
             });
         }
         while let Some(event) = master.poll_event() {
-            if matches!(event, Event::AwaitingApplication { .. }) {
+            match event {
                 // Refused only when the target has changed meanwhile.
-                let _ = master.proceed();
+                Event::AwaitingApplication { .. } => drop(master.proceed()),
+                Event::ClassMismatch { .. }
+                | Event::NoConnection { .. }
+                | Event::CheckFailed { .. }
+                | Event::AddressConflict { .. } => *misread = true,
+                _ => {}
             }
         }
         // What has failed is tried again, as the box does.
-        if master.state() != State::Cp4 && master.target_phase() != Some(Phase::CP4) {
-            master.set_target_phase(Phase::CP4);
+        *misread &= master.phase().is_some_and(|phase| phase > Phase::CP0);
+        let target = if *misread { Phase::CP0 } else { Phase::CP4 };
+        if master.state() != State::Cp4 && master.target_phase() != Some(target) {
+            master.set_target_phase(target);
         }
         for slave in [SlaveId(0), SlaveId(1)] {
             master.commit(slave, 0);

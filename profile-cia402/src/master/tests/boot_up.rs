@@ -287,6 +287,35 @@ fn a_device_whose_answer_comes_after_the_time_out_is_asked_again() {
     assert_eq!(rig.count(|event| matches!(event, Event::DuplicateNode { .. })), 0, "{:?}", rig.log);
 }
 
+/// Its boot-up message crosses the stop that the master sends it: it is stopped, and has no SDO then (CiA 301, 7.3.2.2.4).
+#[test]
+fn a_device_that_is_stopped_while_it_boots_comes_up_again() {
+    for has_heartbeat in [true, false] {
+        let mut rig = running(1);
+        rig.device(1).no_heartbeat = !has_heartbeat;
+        rig.hear(Id::Standard(0x701), &[0x7F]).unwrap();
+        rig.until("the stop", |rig| rig.devices[0].state == NmtState::STOPPED);
+        rig.hear(Id::Standard(0x701), &[0]).unwrap();
+        assert_eq!(rig.state(1), BootState::Identify);
+        let asked_in_vain = rig.now;
+        rig.device(1).no_heartbeat = false;
+        rig.comes_up(&[1]);
+        let took = rig.now.since(asked_in_vain);
+        assert!(took < DurationNs::from_secs(5), "{took}");
+    }
+}
+
+/// As one that is switched on, but after its boot-up amid operation.
+#[test]
+fn a_device_that_falls_silent_behind_its_boot_up_is_given_up_after_its_boot_time() {
+    let mut rig = running(1);
+    rig.device(1).mute = true;
+    let now = rig.now;
+    rig.device(1).reset(now);
+    rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+    assert_eq!((rig.failed().0, rig.now.since(now).as_nanos() / 1_000_000_000), (BootStatus::NO_ANSWER, 10));
+}
+
 #[test]
 fn a_device_that_becomes_slow_is_not_taken_for_two() {
     let mut rig = rig(network(1));
