@@ -11,7 +11,9 @@ program=$(grep -o '"executable":"[^"]*/instructions-[^"]*"' <<<"$built" | tail -
 [ $# -gt 0 ] || mapfile -t all < <("$program" --list)
 for case in "$@" "${all[@]}"; do
     # Only what happens inside the function of the case counts.
-    valgrind --tool=callgrind --callgrind-out-file=/dev/null --collect-atstart=no \
-        --toggle-collect='instructions::counted_*' "$program" "$case" "$count" 2>&1 |
-        awk -v case="$case" -v count="$count" '/Collected :/ { printf "%-30s %10.0f\n", case, $4 / count }'
+    counted=$(valgrind --tool=callgrind --callgrind-out-file=/dev/null --collect-atstart=no \
+        --toggle-collect='instructions::counted_*' "$program" "$case" "$count" 2>&1 | awk '/Collected :/ { print $4 }')
+    # Without its name in the program, a function counts nothing.
+    [ "${counted:-0}" -gt 0 ] || { echo "error: nothing was counted of $case: expected the symbols in $program" >&2; exit 1; }
+    awk -v case="$case" -v counted="$counted" -v count="$count" 'BEGIN { printf "%-30s %10.0f\n", case, counted / count }'
 done

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use tracing::{error, info, warn};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
 
@@ -218,14 +218,28 @@ fn reload(path: &Path) -> Option<Box<Good>> {
     }
 }
 
-/// Logs to standard error, and into the ring; the environment variable `RUST_LOG` overrides the level of the file. The PTP library has lines for each
-/// message, which nobody needs who does not ask for them.
-fn log_to_stderr(level: LogLevel, ring: &Arc<EventRing>) {
-    let own = match level {
-        LogLevel::Error => level.name().to_owned(),
-        level => format!("{},statime=warn", level.name()),
+/// What is logged: what `wanted` says (`debug`, or `info,axisbridge::modbus=trace`), or else the level of the file; and why not what is wanted. The
+/// PTP library has lines for each message, which nobody needs who does not ask for them.
+fn filter(level: LogLevel, wanted: Option<&str>) -> (Targets, Option<String>) {
+    let tracing = match level {
+        LogLevel::Error => LevelFilter::ERROR,
+        LogLevel::Warn => LevelFilter::WARN,
+        LogLevel::Info => LevelFilter::INFO,
+        LogLevel::Debug => LevelFilter::DEBUG,
+        LogLevel::Trace => LevelFilter::TRACE,
     };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(own));
+    let own = Targets::new().with_default(tracing).with_target("statime", tracing.min(LevelFilter::WARN));
+    match wanted.map(str::trim).filter(|wanted| !wanted.is_empty()).map(|wanted| (wanted, wanted.parse())) {
+        None => (own, None),
+        Some((_, Ok(wanted))) => (wanted, None),
+        Some((wanted, Err(error))) => (own, Some(format!("RUST_LOG is not used: `{wanted}`: {error}"))),
+    }
+}
+
+/// Logs to standard error, and into the ring; the environment variable `RUST_LOG` overrides the level of the file.
+fn log_to_stderr(level: LogLevel, ring: &Arc<EventRing>) {
+    let wanted = std::env::var_os("RUST_LOG").map(|wanted| wanted.to_string_lossy().into_owned());
+    let (filter, refused) = filter(level, wanted.as_deref());
     let lines =
         tracing_subscriber::fmt::layer().fmt_fields(LinesOf).with_writer(std::io::stderr).with_target(false);
     // A log file or a journal has no colours.
@@ -235,4 +249,34 @@ fn log_to_stderr(level: LogLevel, ring: &Arc<EventRing>) {
         tracing_subscriber::registry().with(filter).with(lines).with(RingLayer::new(Arc::clone(ring)));
     // Refused only when a logger is set already.
     let _ = logger.try_init();
+    if let Some(refused) = refused {
+        warn!("{refused}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tracing::Level;
+
+    use super::*;
+
+    #[test]
+    fn file_or_variable_says_what_is_logged_and_a_wrong_variable_is_said() {
+        let logged = |level, wanted, target| {
+            let (filter, refused) = filter(level, wanted);
+            let levels = [Level::ERROR, Level::WARN, Level::INFO, Level::DEBUG, Level::TRACE];
+            (levels.iter().filter(|level| filter.would_enable(target, level)).count(), refused)
+        };
+        for (place, level) in LogLevel::ALL.into_iter().enumerate() {
+            assert_eq!(logged(level, None, "axisbridge::runner"), (place + 1, None));
+            assert_eq!(logged(level, Some(" "), "statime::port"), ((place + 1).min(2), None));
+        }
+        assert_eq!(logged(LogLevel::Error, Some("debug"), "statime::port"), (4, None));
+        let wanted = Some("warn,axisbridge::modbus=trace");
+        assert_eq!(logged(LogLevel::Info, wanted, "axisbridge::modbus::server"), (5, None));
+        assert_eq!(logged(LogLevel::Info, wanted, "axisbridge::runner"), (2, None));
+        let (levels, refused) = logged(LogLevel::Info, Some("axisbridge=loud"), "axisbridge::runner");
+        let refused = refused.expect("it is said");
+        assert!(levels == 3 && refused.starts_with("RUST_LOG is not used: `axisbridge=loud`: "), "{refused}");
+    }
 }

@@ -151,7 +151,7 @@ mod tests {
         let log = tracing_subscriber::fmt::layer().fmt_fields(LinesOf).with_target(false).without_time();
         let log = log.with_ansi(false).with_writer(move || writer.clone());
         let subscriber = tracing_subscriber::registry()
-            .with(tracing_subscriber::EnvFilter::new("info"))
+            .with(tracing_subscriber::filter::LevelFilter::INFO)
             .with(log)
             .with(RingLayer::new(Arc::clone(&ring)));
         tracing::subscriber::with_default(subscriber, || {
