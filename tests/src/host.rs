@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
-/// A pause of the host that may stop an axis: the slaves of the examples fall out of their line after five cycles of 2 ms, and the
+/// A pause of the host that may stop an axis: the slaves of the examples as they are shipped fall out of their line after five cycles of 2 ms, and the
 /// watch sees less of a pause than the process that it hits.
 const PAUSE: Duration = Duration::from_millis(6);
 

@@ -221,19 +221,40 @@ fn reload(path: &Path) -> Option<Box<Good>> {
 /// What is logged: what `wanted` says (`debug`, or `info,axisbridge::modbus=trace`), or else the level of the file; and why not what is wanted. The
 /// PTP library has lines for each message, which nobody needs who does not ask for them.
 fn filter(level: LogLevel, wanted: Option<&str>) -> (Targets, Option<String>) {
-    let tracing = match level {
+    let least = match level {
         LogLevel::Error => LevelFilter::ERROR,
         LogLevel::Warn => LevelFilter::WARN,
         LogLevel::Info => LevelFilter::INFO,
         LogLevel::Debug => LevelFilter::DEBUG,
         LogLevel::Trace => LevelFilter::TRACE,
     };
-    let own = Targets::new().with_default(tracing).with_target("statime", tracing.min(LevelFilter::WARN));
-    match wanted.map(str::trim).filter(|wanted| !wanted.is_empty()).map(|wanted| (wanted, wanted.parse())) {
+    let own = Targets::new().with_default(least).with_target("statime", least.min(LevelFilter::WARN));
+    match wanted.filter(|wanted| !wanted.trim().is_empty()).map(targets) {
         None => (own, None),
-        Some((_, Ok(wanted))) => (wanted, None),
-        Some((wanted, Err(error))) => (own, Some(format!("RUST_LOG is not used: `{wanted}`: {error}"))),
+        Some(Ok(wanted)) => (wanted, None),
+        Some(Err(error)) => (own, Some(format!("RUST_LOG is not used: {error}"))),
     }
+}
+
+/// Levels of parts of the program; one without a part is that of all others. The library takes a word that is no level for a part.
+fn targets(wanted: &str) -> Result<Targets, String> {
+    let parts = wanted.split(',').map(str::trim).filter(|part| !part.is_empty());
+    parts.fold(Ok(Targets::new()), |targets, part| {
+        let (target, level) = match part.split_once('=') {
+            Some((target, level)) => (Some(target.trim()), level.trim()),
+            None => (None, part),
+        };
+        let is_path = |target: &str| target.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == ':');
+        let is_good = target.is_none_or(|target| !target.is_empty() && is_path(target)) && !level.is_empty();
+        let level = level.parse::<LevelFilter>().ok().filter(|_| is_good);
+        let level = level.ok_or_else(|| {
+            format!("`{part}`: expected a level, or a part of the program with a level, as in `info,axisbridge::modbus=trace`")
+        })?;
+        Ok(match target {
+            Some(target) => targets?.with_target(target, level),
+            None => targets?.with_default(level),
+        })
+    })
 }
 
 /// Logs to standard error, and into the ring; the environment variable `RUST_LOG` overrides the level of the file.
@@ -250,7 +271,7 @@ fn log_to_stderr(level: LogLevel, ring: &Arc<EventRing>) {
     // Refused only when a logger is set already.
     let _ = logger.try_init();
     if let Some(refused) = refused {
-        warn!("{refused}");
+        error!("{refused}");
     }
 }
 
@@ -272,11 +293,27 @@ mod tests {
             assert_eq!(logged(level, Some(" "), "statime::port"), ((place + 1).min(2), None));
         }
         assert_eq!(logged(LogLevel::Error, Some("debug"), "statime::port"), (4, None));
-        let wanted = Some("warn,axisbridge::modbus=trace");
-        assert_eq!(logged(LogLevel::Info, wanted, "axisbridge::modbus::server"), (5, None));
-        assert_eq!(logged(LogLevel::Info, wanted, "axisbridge::runner"), (2, None));
-        let (levels, refused) = logged(LogLevel::Info, Some("axisbridge=loud"), "axisbridge::runner");
-        let refused = refused.expect("it is said");
-        assert!(levels == 3 && refused.starts_with("RUST_LOG is not used: `axisbridge=loud`: "), "{refused}");
+        for wanted in ["warn,axisbridge::modbus=trace", " warn , axisbridge::modbus = TRACE,"] {
+            let wanted = Some(wanted);
+            assert_eq!(logged(LogLevel::Info, wanted, "axisbridge::modbus::server"), (5, None));
+            assert_eq!(logged(LogLevel::Info, wanted, "axisbridge::runner"), (2, None));
+        }
+        for wanted in [
+            "inof",
+            "axisbridge=loud",
+            "=info",
+            "axisbridge=",
+            "axisbridge[x]=debug",
+            "axisbridge[{x}]=debug",
+            "info,verbose",
+        ] {
+            let (levels, refused) = logged(LogLevel::Info, Some(wanted), "axisbridge::runner");
+            let refused = refused.unwrap_or_else(|| panic!("{wanted} is taken"));
+            let word = wanted.rsplit(',').next().unwrap_or_default();
+            assert!(
+                levels == 3 && refused.starts_with(&format!("RUST_LOG is not used: `{word}`: ")),
+                "{refused}"
+            );
+        }
     }
 }

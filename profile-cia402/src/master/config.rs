@@ -302,7 +302,7 @@ pub struct MasterConfig {
     pub boot_up_time: DurationNs,
     /// Wait before a device that does not answer is asked again, or that was lost is reset.
     pub retry_time: DurationNs,
-    /// Time after which a device that never answered is given up (1F89); zero for never.
+    /// Time after which a device that does not answer is given up, from its reset or its boot-up on (1F89); zero for never.
     pub boot_time: DurationNs,
     /// SDO frames per SYNC period, of all devices together. Zero for as many as the bus takes.
     pub sdo_frames_per_cycle: u8,

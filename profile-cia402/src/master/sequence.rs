@@ -69,10 +69,10 @@ impl Master {
                 }
                 // One that was reset has its time since then.
                 station.give_up = station.give_up.or(config.gives_up_at(now));
-                // One that did not answer may be stopped, and then has no SDO: a boot-up message can cross the stop that a lost
-                // device is sent. One that may be in operation is left alone, unless it says that it is stopped.
-                let stopped = station.heartbeat == Some(NmtState::STOPPED);
-                if last == BootState::Retry && event == BootEvent::Elapsed && (stopped || !node.keep_alive) {
+                // It may be stopped, and then has no SDO: a boot-up message can cross the stop that a lost device is sent. One that may
+                // be in operation is left alone, unless it has started anew or says that it is stopped.
+                let out = matches!(station.heartbeat, Some(NmtState::BOOT_UP | NmtState::STOPPED));
+                if last == BootState::Retry && event == BootEvent::Elapsed && (out || !node.keep_alive) {
                     station.nmt = Some(NmtCommand::ENTER_PRE_OPERATIONAL);
                 }
             }
@@ -125,7 +125,9 @@ impl Master {
                 let node = station.node;
                 self.emit(Event::Operational { node });
             }
-            BootState::Program | BootState::Control | BootState::Failed => {}
+            // A download takes its time, and the device that starts with it has its own.
+            BootState::Program => station.give_up = None,
+            BootState::Control | BootState::Failed => {}
         }
     }
 

@@ -21,7 +21,7 @@ use profile_cip::wire::status::Service;
 use profile_cip::wire::triad::ConnectionTriad;
 
 use super::flood::{GATEWAY, Network, STRANGER, all_arrived, numbers, run};
-use super::{one_bus, wait_for};
+use super::{a_bus, wait_for};
 
 /// Set for the copy of this test binary that attacks: the name of the attack, and the milliseconds that it has.
 const ATTACK: &str = "AXISBRIDGE_TEST_ATTACK";
@@ -358,7 +358,7 @@ fn attacks_on_every_port_cost_moving_axes_nothing() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     alone_in_real_time(name, || attacked(name));
 }
 

@@ -9,7 +9,7 @@ use axisbridge_tests::namespace::{Namespace, cable};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::Running;
 
-use super::{in_namespace, one_bus, scratch, wait_for};
+use super::{a_bus, in_namespace, scratch, wait_for};
 
 const CONFIGURATION: &str = r#"
 [box]
@@ -135,7 +135,7 @@ fn a_drive_with_fixed_lists_is_driven_by_them_in_their_order() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         // The velocity before the control word, and the status word in the middle.
         let lists = ["S-0-0036,S-0-0134", "S-0-0051,S-0-0135,S-0-0040"];
@@ -170,7 +170,7 @@ fn a_drive_whose_fixed_lists_do_not_serve_is_refused_by_name() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     for whose in [Whose::Ours, Whose::SomebodyElses] {
         in_real_time(name, || {
             // A torque command that no mode of the axis has a value for would be sent as zero.

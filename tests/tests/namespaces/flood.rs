@@ -22,7 +22,7 @@ use axisbridge_tests::process::Running;
 use axisbridge_tests::rig::network::Random;
 use profile_cip::wire::class1::Class1Datagram;
 
-use super::{in_namespace, one_bus, scratch, wait_for};
+use super::{a_bus, in_namespace, scratch, wait_for};
 
 pub(super) const CONTROLLER: &str = "192.168.10.1";
 pub(super) const GATEWAY: &str = "192.168.10.20";
@@ -212,7 +212,7 @@ fn a_flood_of_a_stranger_costs_moving_axes_nothing() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     alone_in_real_time(name, || flooded(name));
 }
 

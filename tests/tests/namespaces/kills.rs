@@ -17,7 +17,7 @@ use profile_cip::wire::status::Service;
 use serde_json::Value;
 
 use super::attackers::{answer_of, message};
-use super::{in_namespace, one_bus, scratch, wait_for};
+use super::{a_bus, in_namespace, scratch, wait_for};
 
 /// How often the gateway is killed, where it is not to be five times.
 const KILLS: &str = "AXISBRIDGE_KILLS";
@@ -144,7 +144,7 @@ fn no_kill_of_the_gateway_lets_an_axis_move_or_damages_what_is_kept() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, killed);
 }
 

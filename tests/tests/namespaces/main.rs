@@ -34,7 +34,7 @@ static BUSES: (Mutex<u32>, Condvar) = (Mutex::new(3), Condvar::new());
 struct Bus;
 
 /// Waits for the right to run a bus.
-fn one_bus() -> Bus {
+fn a_bus() -> Bus {
     let (free, freed) = &BUSES;
     let free = free.lock().unwrap_or_else(PoisonError::into_inner);
     let mut free = freed.wait_while(free, |free| *free == 0).unwrap_or_else(PoisonError::into_inner);
@@ -114,7 +114,7 @@ fn three_processes_move_two_axes_while_a_modbus_client_reads_them() {
     if !peer::namespaces_or_skip("three_processes_move_two_axes_while_a_modbus_client_reads_them") {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time("three_processes_move_two_axes_while_a_modbus_client_reads_them", three_processes);
 }
 

@@ -10,7 +10,7 @@ use axisbridge_tests::peer;
 use axisbridge_tests::process::Running;
 use profile_sercos::wire::header::{Channel, Header, Kind, Phase, PhaseField, TelegramType};
 
-use super::{configuration, in_namespace, one_bus, scratch, start_box, wait_for};
+use super::{a_bus, configuration, in_namespace, scratch, start_box, wait_for};
 
 /// Set for the copy of this test binary that replays telegrams at the other end of the cable.
 const REPLAYS: &str = "AXISBRIDGE_TEST_REPLAY";
@@ -25,7 +25,7 @@ fn a_second_master_on_an_interface_is_refused_and_told_who_has_it() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let (gateway, drives) = (Namespace::new("box"), Namespace::new("drv"));
         cable((&gateway, "sercos0", None), (&drives, "sercos0", None));
@@ -73,7 +73,7 @@ fn telegrams_of_another_master_keep_the_box_silent_until_they_end() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let (gateway, other) = (Namespace::new("box"), Namespace::new("oth"));
         cable((&gateway, "sercos0", None), (&other, "sercos0", None));

@@ -8,7 +8,7 @@ use axisbridge_tests::namespace::{Namespace, cable};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::Running;
 
-use super::{in_namespace, one_bus, scratch, start_box, wait_for};
+use super::{a_bus, in_namespace, scratch, start_box, wait_for};
 
 #[test]
 fn a_drive_waits_for_its_port_and_a_typed_fault_is_one_at_the_gateway() {
@@ -16,7 +16,7 @@ fn a_drive_waits_for_its_port_and_a_typed_fault_is_one_at_the_gateway() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let (gateway, drives) = (Namespace::new("box"), Namespace::new("drv"));
         cable((&gateway, "sercos0", None), (&drives, "sercos0", None));

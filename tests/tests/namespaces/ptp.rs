@@ -43,9 +43,14 @@ fn configuration(name: &str, source: &str) -> PathBuf {
     path
 }
 
-/// The management socket of a grandmaster.
-fn socket(priority: u8) -> PathBuf {
-    std::env::temp_dir().join(format!("axb-ptp4l-{priority}-{}", std::process::id()))
+/// The management socket of a `ptp4l`; tests run beside each other, and a namespace is that of one.
+fn socket(namespace: &Namespace, priority: u8) -> PathBuf {
+    std::env::temp_dir().join(format!("{}-ptp4l-{priority}", namespace.name()))
+}
+
+/// What a `ptp4l` prints.
+pub fn log_of(namespace: &Namespace, priority: u8) -> PathBuf {
+    scratch(&format!("ptp4l-{}-{priority}.log", namespace.name()))
 }
 
 /// A grandmaster in a namespace.
@@ -53,11 +58,11 @@ fn grandmaster(namespace: &Namespace, priority: u8) -> Running {
     ptp4l(namespace, priority, "logAnnounceInterval 1\nlogSyncInterval 0\n")
 }
 
-/// `ptp4l` in a namespace with these settings; its log is `ptp4l-PRIORITY.log`. It sets no clock (`free_running`): a slave would set
+/// `ptp4l` in a namespace with these settings. It sets no clock (`free_running`): a slave would set
 /// that of the host, which all namespaces share.
 pub fn ptp4l(namespace: &Namespace, priority: u8, settings: &str) -> Running {
-    let config = scratch(&format!("ptp4l-{priority}.conf"));
-    let socket = socket(priority);
+    let log = log_of(namespace, priority);
+    let (config, socket) = (log.with_extension("conf"), socket(namespace, priority));
     let text = format!(
         "[global]\ntime_stamping software\nfree_running 1\nnetwork_transport UDPv4\ndelay_mechanism E2E\n{settings}\
          logMinDelayReqInterval 0\ndscp_event 59\ndscp_general 47\ntx_timestamp_timeout 50\n\
@@ -67,8 +72,7 @@ pub fn ptp4l(namespace: &Namespace, priority: u8, settings: &str) -> Running {
     std::fs::write(&config, text).expect("the scratch folder can be written");
     let mut command = namespace.command("ptp4l");
     command.args(["-i", "net0", "-m", "-f", config.to_str().expect("a path in UTF-8")]);
-    let log =
-        std::fs::File::create(scratch(&format!("ptp4l-{priority}.log"))).expect("the log can be written");
+    let log = std::fs::File::create(log).expect("the log can be written");
     Running::start("ptp4l", command.stdout(log).stderr(Stdio::null()))
 }
 
@@ -218,7 +222,7 @@ fn the_box_takes_the_time_of_ptp4l_beside_it() {
     let (controller, gateway) = (Namespace::new("ctl"), Namespace::new("box"));
     cable((&controller, "net0", Some("192.168.30.1/24")), (&gateway, "net0", Some(&format!("{BOX}/24"))));
     let mut daemon = grandmaster(&gateway, 77);
-    let source = format!("source = \"daemon\"\nsocket = \"{}\"", socket(77).display());
+    let source = format!("source = \"daemon\"\nsocket = \"{}\"", socket(&gateway, 77).display());
     let (config, log) = (configuration("ptp-daemon", &source), scratch("ptp-daemon.log"));
     let mut run = in_namespace(&gateway, &["run", "--config", config.to_str().expect("a path in UTF-8")]);
     run.env("NO_COLOR", "1").stderr(std::fs::File::create(&log).expect("the log can be written"));

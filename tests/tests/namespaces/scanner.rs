@@ -15,7 +15,7 @@ use axisbridge_tests::tshark::{self, Frame};
 use serde_json::{Value, json};
 
 use super::flood;
-use super::{configuration, in_namespace, one_bus, scratch, wait_for};
+use super::{a_bus, configuration, in_namespace, scratch, wait_for};
 
 const DEVICE: &str = "192.168.10.20";
 
@@ -71,7 +71,7 @@ fn a_foreign_scanner_moves_a_drive_in_another_process() {
         return;
     }
     let Some(python) = peer::python_or_skip(name, "ethernetip") else { return };
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let (plc, gateway, drives) = (Namespace::new("plc"), Namespace::new("box"), Namespace::new("drv"));
         cable((&plc, "net0", Some("192.168.10.1/24")), (&gateway, "net0", Some("192.168.10.20/24")));
@@ -177,7 +177,7 @@ fn two_hosts_consume_one_multicast_stream() {
         return;
     }
     let Some(python) = peer::python_or_skip(name, "ethernetip") else { return };
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let [first, second, gateway, switch] = ["one", "two", "box", "sw"].map(Namespace::new);
         flood::run(&switch, "ip link add br0 type bridge");

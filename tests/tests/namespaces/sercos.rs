@@ -11,7 +11,7 @@ use axisbridge_tests::namespace::{Namespace, cable};
 use axisbridge_tests::peer;
 use axisbridge_tests::process::Running;
 
-use super::{in_namespace, one_bus, scratch, wait_for};
+use super::{a_bus, in_namespace, scratch, wait_for};
 
 /// Address of the box, where its controller is in the same namespace.
 const BOX: &str = "127.0.0.2";
@@ -152,7 +152,7 @@ fn moves(name: &str, processes: usize, drives_each: usize, cycle_ms: u16) {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let mut bus = Bus::start(name, processes, drives_each, cycle_ms, Shape::Line);
         bus.wait_for("CP4");
@@ -185,7 +185,7 @@ fn a_ring_of_eight_is_cut_and_healed_while_all_axes_move() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let mut bus = Bus::start(name, 2, 4, 4, Shape::Ring);
         bus.wait_for("CP4");
@@ -211,7 +211,7 @@ fn a_drive_is_plugged_in_behind_a_running_one_and_moved() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let mut bus = Bus::start(name, 1, 1, 4, Shape::Prepared);
         bus.wait_for("a place is kept for the slave with address 2");
@@ -244,7 +244,7 @@ fn a_scan_over_a_cable_makes_a_configuration_that_runs() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let (gateway, drives) = (Namespace::new("box"), Namespace::new("drv"));
         cable((&gateway, "sercos0", None), (&drives, "sercos0", None));
@@ -319,7 +319,7 @@ fn other_traffic_crosses_the_cable_of_a_running_bus() {
     if !peer::namespaces_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let mut bus = Bus::start(name, 1, 2, 4, Shape::Line);
         bus.gateway.add_address("sercos0", "192.0.2.1/24");

@@ -30,8 +30,8 @@ use axisbridge_tests::rig::motion_checker::recording;
 use profile_generic::time::DurationNs;
 use serde_json::Value;
 
-use super::ptp::{ptp4l, wait_for_count};
-use super::{in_namespace, one_bus, scratch};
+use super::ptp::{log_of, ptp4l, wait_for_count};
+use super::{a_bus, in_namespace, scratch};
 
 const GATEWAY: &str = "192.168.40.3";
 const CONTROLLER: &str = "192.168.40.2";
@@ -282,7 +282,7 @@ fn axes_move_through_changes_of_their_time(name: &str, pace: Pace) {
     if !peer::namespaces_or_skip(name) || !peer::ptp4l_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let mut plant = Plant::start(name);
         let intervals =
@@ -428,7 +428,7 @@ fn a_controller_that_is_the_grandmaster_moves_the_axes_of_its_follower() {
     if !peer::namespaces_or_skip(name) || !peer::ptp4l_or_skip(name) || !peer::tshark_or_skip(name) {
         return;
     }
-    let _alone = one_bus();
+    let _bus = a_bus();
     in_real_time(name, || {
         let mut plant = Plant::start(name);
         let capture = scratch(&format!("{name}-ptp.pcapng"));
@@ -467,13 +467,13 @@ fn a_controller_that_is_the_grandmaster_moves_the_axes_of_its_follower() {
         let told = String::from_utf8_lossy(&refused.stderr);
         assert!(!refused.status.success() && told.contains("different grand master"), "{told}");
 
-        let gateway_capture = plant.capture.clone();
+        let (gateway_capture, log_of_follower) = (plant.capture.clone(), log_of(&plant.master, 130));
         let log = plant.end();
         assert!(!is_faulted(&log), "{log}");
         no_jump(&gateway_capture, &log, 300, 400);
         ptp_is_told_as_it_should(&capture);
         // What ptp4l measures is the clock of the controller against the host's.
-        let followed = std::fs::read_to_string(scratch("ptp4l-130.log")).unwrap_or_default();
+        let followed = std::fs::read_to_string(log_of_follower).unwrap_or_default();
         let offset =
             |line: &str| line.split("master offset").nth(1)?.split_whitespace().next()?.parse::<i64>().ok();
         let offsets: Vec<i64> = followed.lines().filter_map(offset).collect();

@@ -696,7 +696,7 @@ fn the_assemblies_of_the_speed_profile_run_an_axis_both_ways() {
     assert!((119..=121).contains(&speed(&plc).2), "{:?}", speed(&plc));
     order(&mut plc, 0x61, 60);
     plc.until(2_000, "60 rpm", |plc| plc.speed() < NANO + NANO / 50);
-    // The input of this layout has no place for the reason: the log has it, once for each time.
+    // The input of this layout has no place for the reason: the log has it, once while it lasts.
     let said = |plc: &Plc| plc.rig.told().matches("is refused: both directions").count();
     assert_eq!(said(&plc), 0);
     order(&mut plc, 0x63, 60);

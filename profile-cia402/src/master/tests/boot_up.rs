@@ -290,18 +290,40 @@ fn a_device_whose_answer_comes_after_the_time_out_is_asked_again() {
 /// Its boot-up message crosses the stop that the master sends it: it is stopped, and has no SDO then (CiA 301, 7.3.2.2.4).
 #[test]
 fn a_device_that_is_stopped_while_it_boots_comes_up_again() {
-    for has_heartbeat in [true, false] {
-        let mut rig = running(1);
+    for (keep_alive, has_heartbeat) in [(false, true), (false, false), (true, true), (true, false)] {
+        let mut config = network(1);
+        config.nodes[0].keep_alive = keep_alive;
+        let mut rig = rig(config);
+        rig.master.start(rig.now);
+        rig.comes_up(&[1]);
         rig.device(1).no_heartbeat = !has_heartbeat;
         rig.hear(Id::Standard(0x701), &[0x7F]).unwrap();
         rig.until("the stop", |rig| rig.devices[0].state == NmtState::STOPPED);
         rig.hear(Id::Standard(0x701), &[0]).unwrap();
         assert_eq!(rig.state(1), BootState::Identify);
         let asked_in_vain = rig.now;
+        rig.until("retry", |rig| rig.state(1) == BootState::Retry);
+        rig.until("an answer", |rig| !matches!(rig.state(1), BootState::Identify | BootState::Retry));
         rig.device(1).no_heartbeat = false;
         rig.comes_up(&[1]);
         let took = rig.now.since(asked_in_vain);
-        assert!(took < DurationNs::from_secs(5), "{took}");
+        assert!(took < DurationNs::from_secs(5), "{keep_alive} {has_heartbeat}: {took}");
+    }
+}
+
+#[test]
+fn a_device_that_may_be_in_operation_and_does_not_answer_is_left_there() {
+    for silent in [true, false] {
+        let mut rig = running(1);
+        let mut config = network(1);
+        config.nodes[0].keep_alive = true;
+        rig.master = Master::new(config).unwrap();
+        (rig.device(1).mute, rig.device(1).no_heartbeat) = (true, silent);
+        rig.forget();
+        rig.master.start(rig.now);
+        rig.until("failure", |rig| rig.state(1) == BootState::Failed);
+        assert!(rig.sent.iter().all(|(_, frame)| frame.id() != cob_id::NMT), "{silent}: {:?}", rig.sent);
+        assert_eq!(rig.devices[0].state, NmtState::OPERATIONAL);
     }
 }
 
