@@ -238,8 +238,8 @@ fn filter(level: LogLevel, wanted: Option<&str>) -> (Targets, Option<String>) {
 
 /// Levels of parts of the program; one without a part is that of all others. The library takes a word that is no level for a part.
 fn targets(wanted: &str) -> Result<Targets, String> {
-    let parts = wanted.split(',').map(str::trim).filter(|part| !part.is_empty());
-    parts.fold(Ok(Targets::new()), |targets, part| {
+    let mut parts = wanted.split(',').map(str::trim).filter(|part| !part.is_empty());
+    parts.try_fold(Targets::new(), |targets, part| {
         let (target, level) = match part.split_once('=') {
             Some((target, level)) => (Some(target.trim()), level.trim()),
             None => (None, part),
@@ -251,8 +251,8 @@ fn targets(wanted: &str) -> Result<Targets, String> {
             format!("`{part}`: expected a level, or a part of the program with a level, as in `info,axisbridge::modbus=trace`")
         })?;
         Ok(match target {
-            Some(target) => targets?.with_target(target, level),
-            None => targets?.with_default(level),
+            Some(target) => targets.with_target(target, level),
+            None => targets.with_default(level),
         })
     })
 }
