@@ -17,6 +17,8 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::host::in_real_time;
+
 /// The kernel, and where its modules are (Debian package user-mode-linux).
 const PROGRAM: &str = "/usr/bin/linux.uml";
 const MODULES: &str = "/usr/lib/uml/modules";
@@ -219,6 +221,15 @@ impl Kernel {
         assert!(said.contains("1 passed"), "the test did not run inside the CAN kernel:\n{said}");
         print!("{said}");
         false
+    }
+
+    /// As [`inside`](Self::inside) outside of a guest, and [again](in_real_time) when the host did not keep time: devices in a guest miss
+    /// a heartbeat then.
+    ///
+    /// # Panics
+    /// When the test fails inside, or this is a guest.
+    pub fn inside_in_real_time(&self, name: &str) {
+        in_real_time(name, || assert!(!self.inside(name), "there is only one guest"));
     }
 
     fn settings(&self, command: &Command) -> String {

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
-/// A pause of the host that may stop an axis: the slaves of the examples as they are shipped fall out of their line after five cycles of 2 ms, and the
-/// watch sees less of a pause than the process that it hits.
+/// A pause of the host that may stop an axis: the slaves of the examples as they are shipped fall out of their line after five cycles of
+/// 2 ms, and the watch sees less of a pause than the process that it hits.
 const PAUSE: Duration = Duration::from_millis(6);
 
 /// Read while a test of processes in real time runs beside others, written while one runs alone: on a small host they may disturb

@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 
 use axisbridge::sys::can_interface::{self, Settings};
 use axisbridge_tests::can_kernel::{self, Kernel};
-use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::peer::{can_kernel_or_skip, python_or_skip};
 use axisbridge_tests::process::{Running, axisbridge};
 use axisbridge_tests::slcan::{self, Adapters};
@@ -102,7 +101,7 @@ fn runs_in(test: &str, kernel: Kernel) {
     static ALONE: Mutex<()> = Mutex::new(());
     let kernel = kernel.urgent().environment(BINARY, axisbridge().as_os_str());
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    in_real_time(test, || assert!(!kernel.inside(test)));
+    kernel.inside_in_real_time(test);
 }
 
 /// Drives of somebody else, after what three makers' manuals say of theirs: enabled, moved, faulted, reset, and moved again.

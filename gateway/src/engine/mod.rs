@@ -60,7 +60,7 @@ use self::direct::DirectNorth;
 use self::ending::Ending;
 use self::local::LocalNorth;
 use self::north::{Exchange, North};
-use self::notice::Notice;
+use self::notice::{Notice, axis_number};
 use self::phase_lock::PhaseLock;
 use self::port::{NorthPort, SouthPort};
 use self::programs::{Programs, ProgramsOfDrives};
@@ -556,14 +556,14 @@ fn hand_on(
         Purpose::Diagnosis => axis.diagnostic_word(now, system, answer.item, data.ok().and_then(unsigned)),
         Purpose::DiagnosticMessage => {
             if let Some(said) = axis.diagnostic_message_read(answer.item, data.ok()) {
-                notice(Notice::DriveSays { axis: u8::try_from(answer.axis).unwrap_or(u8::MAX), said });
+                notice(Notice::DriveSays { axis: axis_number(answer.axis), said });
             }
         }
         Purpose::Nameplate => {
             if let Some(Difference { parameter, configured, held }) =
                 axis.nameplate_value_read(answer.item, data.ok())
             {
-                let axis = u8::try_from(answer.axis).unwrap_or(u8::MAX);
+                let axis = axis_number(answer.axis);
                 notice(Notice::OtherNameplate { axis, parameter, configured, held });
             }
         }

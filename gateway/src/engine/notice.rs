@@ -433,6 +433,12 @@ pub enum Notice {
     },
 }
 
+/// The number of an axis as notices have it.
+pub(super) fn axis_number(axis: usize) -> u8 {
+    // There are 64 at most.
+    u8::try_from(axis).unwrap_or(u8::MAX)
+}
+
 impl Notice {
     /// How much it matters.
     #[must_use]

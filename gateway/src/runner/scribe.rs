@@ -146,6 +146,7 @@ const fn limited(notice: &Notice) -> Option<(LineKind, Peer)> {
 
 #[cfg(test)]
 mod tests {
+    use profile_cip::assembly::Refusal;
     use profile_cip::device::axis_object::refused::{RefusalReason, RefusedRequest};
     use profile_cip::device::axis_state::AxisState;
     use profile_cip::wire::motion::codes::AxisControl;
@@ -196,6 +197,26 @@ mod tests {
                 line.text.starts_with("request refused: more such lines")
                     && line.text.ends_with(" count=9996")
             );
+        }
+    }
+
+    /// A speed layout has an order refused as often as its bits change.
+    #[test]
+    fn ten_thousand_refused_orders_of_an_output_assembly_are_few_lines() {
+        let scribe = scribe();
+        let lines = lines_of(|| {
+            for number in 0..10_000 {
+                let at = MonotonicTime::ZERO + DurationNs::from_millis(number * 5);
+                let order = Notice::OrderRefused { axis: 0, refusal: Refusal::BOTH_DIRECTIONS };
+                scribe.take(at, &order);
+                scribe.limit.report(at, &scribe.axes);
+            }
+        });
+        let text = "what the controller orders in the output assembly is refused: both directions";
+        assert_eq!(lines.len(), 4, "{lines:?}");
+        for line in lines {
+            let about = (line.text.as_str(), line.kind.as_str(), line.axis.as_deref());
+            assert_eq!(about, (text, "refusal", Some("turntable")));
         }
     }
 

@@ -48,11 +48,6 @@ const CASES: &[&str] = &[
     "engine_cycle_4",
     "engine_cycle_16",
     "engine_cycle_64",
-    "recorded_engine_cycle_1",
-    "recorded_engine_cycle_2",
-    "recorded_engine_cycle_4",
-    "recorded_engine_cycle_16",
-    "recorded_engine_cycle_64",
     "rpdos_out",
     "tpdos_in_and_rpdos_out",
     "new_state_in_and_rpdos_out",
@@ -174,12 +169,6 @@ fn run(case: &str, count: u32) {
                 "engine_cycle" => {
                     let mut many = engine::crowd(usize::from(axes));
                     repeat(count, || many.cycle_in(|cycle| counted_engine(cycle)));
-                }
-                "recorded_engine_cycle" => {
-                    let mut many = engine::crowd(usize::from(axes));
-                    let recording = engine::record(&mut many);
-                    repeat(count, || many.cycle_in(|cycle| counted_engine(cycle)));
-                    engine::assert_complete(recording);
                 }
                 codec_case => codec(codec_case, axes, count),
             }

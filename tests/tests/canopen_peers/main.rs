@@ -13,7 +13,6 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use axisbridge_tests::can_kernel::{Kernel, is_inside};
-use axisbridge_tests::host::in_real_time;
 use axisbridge_tests::peer::{can_kernel_or_skip, python_or_skip};
 use axisbridge_tests::process::{Running, axisbridge};
 
@@ -45,18 +44,13 @@ fn told(name: &str) -> PathBuf {
     std::env::var_os(name).map(PathBuf::from).unwrap_or_else(|| panic!("{name} is set in a guest"))
 }
 
-/// Runs a test in a guest. Devices there miss a heartbeat when the host pauses.
-fn runs_in(test: &str, kernel: &Kernel) {
-    in_real_time(test, || assert!(!kernel.inside(test), "there is only one guest"));
-}
-
 /// The Python to go on with: only inside a guest. Outside it runs `test` in one.
 fn python_inside(test: &str) -> Option<PathBuf> {
     if is_inside() {
         return Some(told(PYTHON));
     }
     let python = python_outside(test)?;
-    runs_in(test, &kernel(&python));
+    kernel(&python).inside_in_real_time(test);
     None
 }
 
@@ -66,7 +60,7 @@ fn python_and_binary_inside(test: &str) -> Option<(PathBuf, PathBuf)> {
         return Some((told(PYTHON), told(BINARY)));
     }
     let python = python_outside(test)?;
-    runs_in(test, &kernel(&python).environment(BINARY, axisbridge().as_os_str()));
+    kernel(&python).environment(BINARY, axisbridge().as_os_str()).inside_in_real_time(test);
     None
 }
 

@@ -111,7 +111,7 @@ fn our_drive_does_what_a_foreign_library_expects_of_one() {
         let path = folder.join("library.pcapng");
         let kernel = kernel(&python).environment(BINARY, axisbridge().as_os_str());
         let kernel = kernel.writable(&folder).environment(RECORDING, path.as_os_str());
-        runs_in(test, &kernel);
+        kernel.inside_in_real_time(test);
         check_recording(test, &path);
         return;
     }

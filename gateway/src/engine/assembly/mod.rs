@@ -32,7 +32,7 @@ use self::parameters::Parameters;
 use super::axis::{AxisChannel, StopSettings};
 use super::bus::{Answer, Buses};
 use super::north::{Exchange, North};
-use super::notice::Notice;
+use super::notice::{Notice, axis_number};
 use super::port::NorthPort;
 use crate::mapping::Mapping;
 use crate::north::DeviceEnd;
@@ -266,7 +266,7 @@ impl North for AssemblyChannel {
             let output = output.unwrap_or_default();
             let shown = member.refusal();
             member.follow(&around, axis, &output);
-            let (number, refusal) = (u8::try_from(member.number).unwrap_or(u8::MAX), member.refusal());
+            let (number, refusal) = (axis_number(member.number), member.refusal());
             if refusal != shown && refusal != Refusal::NONE {
                 notice(Notice::OrderRefused { axis: number, refusal });
             }

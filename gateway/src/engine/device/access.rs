@@ -18,7 +18,7 @@ use crate::engine::access::{Access, Operation};
 use crate::engine::axis::AxisChannel;
 use crate::engine::bus::{Answer, Buses, Purpose};
 use crate::engine::direct::DirectFailure;
-use crate::engine::notice::Notice;
+use crate::engine::notice::{Notice, axis_number};
 use crate::engine::parameter::{ParameterJob, ParameterJobs};
 use crate::mapping::{
     self, AttributeEntry, AttributeTable, Backing, CipTables, Item, Mapping, MechanicalFact, Number,
@@ -303,7 +303,7 @@ impl Accesses {
             (true, result) => {
                 self.originals.written();
                 if let Err(failure) = result {
-                    let axis = u8::try_from(answer.axis).unwrap_or(u8::MAX);
+                    let axis = axis_number(answer.axis);
                     notice(Notice::NotReturned { axis, item: answer.item, failure });
                 }
             }
@@ -487,7 +487,7 @@ impl Accessed<'_> {
 
     /// What the drive says of a value that it does not take.
     fn refused(&self, write: &Write, said: DirectFailure) -> Notice {
-        let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
+        let axis = axis_number(self.axis_number);
         let wanted = self.attributes.get(write.attribute).and_then(|entry| entry.number(&write.bytes));
         let (attribute, item, is_taken) = (write.attribute, write.item, write.stage == WriteStage::ReadBack);
         Notice::DriveRefuses { axis, attribute, wanted, item, is_taken, said }
@@ -509,7 +509,7 @@ impl Accessed<'_> {
         if entry.agree(&write.bytes, held) {
             return Ok(());
         }
-        let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
+        let axis = axis_number(self.axis_number);
         let (wanted, held) = (entry.number(&write.bytes), entry.number(held));
         notice(Notice::NotKept { axis, attribute, wanted, held });
         Err(GeneralStatus::INVALID_ATTRIBUTE_VALUE)
@@ -523,7 +523,7 @@ impl Accessed<'_> {
         configured: bool,
         notice: &mut dyn FnMut(Notice),
     ) -> GeneralStatus {
-        let axis = u8::try_from(self.axis_number).unwrap_or(u8::MAX);
+        let axis = axis_number(self.axis_number);
         notice(Notice::NotEqual { axis, attribute, wanted, held, configured });
         GeneralStatus::INVALID_ATTRIBUTE_VALUE
     }

@@ -16,7 +16,7 @@ use super::reactions;
 use super::scaling::{Scaling, signal_octets};
 use super::stopping::{Settings, StopDefaults, Stopping};
 use crate::engine::axis::{AxisChannel, Owner, Reactions, Updates};
-use crate::engine::notice::Notice;
+use crate::engine::notice::{Notice, axis_number};
 use crate::mapping::{CipProgram, CipScaling, FeedbackUse, Mapping};
 
 /// What a device has to know of one of its axes.
@@ -84,7 +84,7 @@ impl Member {
 
     /// Its number in the log.
     pub fn number(&self) -> u8 {
-        u8::try_from(self.axis).unwrap_or(u8::MAX)
+        axis_number(self.axis)
     }
 
     /// The axis as its attributes are accessed, and the accesses that wait for its drive.

@@ -25,7 +25,7 @@ use self::axis::LocalAxis;
 use super::axis::AxisChannel;
 use super::bus::{self, Buses, Purpose};
 use super::north::{Exchange, North};
-use super::notice::Notice;
+use super::notice::{Notice, axis_number};
 use super::parameter::{Next, ParameterFailure, ParameterJob, ParameterJobs};
 use crate::mapping::Mapping;
 
@@ -295,7 +295,7 @@ impl North for LocalNorth {
 
 /// That local control has taken or released an axis.
 fn owner_changed(axis: usize, taken: bool) -> Notice {
-    Notice::LocalControl { axis: u8::try_from(axis).unwrap_or(u8::MAX), taken }
+    Notice::LocalControl { axis: axis_number(axis), taken }
 }
 
 /// Holder of an axis that stops because its client has disconnected.

@@ -151,6 +151,26 @@ fn silence_is_borne_while_a_program_is_written() {
     rig.kept();
 }
 
+/// A download that takes longer than a boot takes none of the time of the device that starts with it.
+#[test]
+fn a_device_has_its_boot_time_behind_a_long_download() {
+    let mut rig = beside(programmed(true), |device| flash(device, |flash| flash.has_loader = true));
+    let wrote =
+        |rig: &Rig, controls: &[u8]| rig.devices[0].objects.flash.as_ref().unwrap().controls == controls;
+    rig.until("erased", |rig| wrote(rig, &[0, 3]));
+    rig.device(1).mute = true;
+    rig.run_ms(15_000);
+    rig.device(1).mute = false;
+    rig.until("started", |rig| wrote(rig, &[0, 3, 1]));
+    rig.device(1).mute = true;
+    rig.until("retry", |rig| rig.state(1) == BootState::Retry);
+    rig.run_ms(1_000);
+    rig.device(1).mute = false;
+    rig.comes_up(&[1, 2]);
+    assert_eq!(rig.count(|event| matches!(event, Event::BootFailed { .. })), 0, "{:?}", rig.log);
+    rig.kept();
+}
+
 #[test]
 fn a_program_is_downloaded_once_until_the_master_is_started_again() {
     let mut rig = beside(programmed(true), |device| flash(device, |flash| flash.spoils = true));

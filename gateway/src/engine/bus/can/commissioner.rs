@@ -16,7 +16,7 @@ use super::readback::Readback;
 use super::trial::Trial;
 use crate::engine::bus::startup::{StartupAccess, StartupRun, When};
 use crate::engine::direct::DirectFailure;
-use crate::engine::notice::Notice;
+use crate::engine::notice::{Notice, axis_number};
 use crate::mapping::{
     Cia402Axis, Cia402Dictionary, Cia402Error, DriveIdentity, DriveProgram, Item, Mapping, Object,
     ObjectFacts, ObjectStep, Plan,
@@ -306,7 +306,7 @@ impl DeviceWork {
     }
 
     fn number(&self, place: usize) -> u8 {
-        self.axes.get(place).map_or(u8::MAX, |setup| u8::try_from(setup.axis).unwrap_or(u8::MAX))
+        self.axes.get(place).map_or(u8::MAX, |setup| axis_number(setup.axis))
     }
 
     /// Sends what may be sent, and goes on to the next plan when this one is through.

@@ -7,7 +7,7 @@ use super::super::commissioner::{CommissionerHandle, Done, Run, Work};
 use super::direct::DirectAccess;
 use crate::engine::bus::startup::{StartupAccess, StartupRun, When};
 use crate::engine::direct::DirectFailure;
-use crate::engine::notice::Notice;
+use crate::engine::notice::{Notice, axis_number};
 use crate::parameter::id::Id;
 use crate::parameter::startup::StartupEntry;
 
@@ -36,7 +36,7 @@ pub fn commissioner<'l>(
     drives: impl IntoIterator<Item = (usize, &'l [StartupEntry])>,
 ) -> (Commissioner, CommissionerHandle<ListWork>) {
     let work = |(axis, list)| ListWork {
-        axis: u8::try_from(axis).unwrap_or(u8::MAX),
+        axis: axis_number(axis),
         list: StartupRun::new(list),
         run: Run::default(),
         asked: None,

@@ -38,7 +38,7 @@ use crate::engine::access::{Access, Data, Operation, Progress};
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
 use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun, Target};
-use crate::engine::notice::Notice;
+use crate::engine::notice::{Notice, axis_number};
 use crate::engine::port::SouthPort;
 use crate::mapping::devicenet::ROW_LEN;
 use crate::mapping::{DriveProgram, Item, Mapping};
@@ -223,7 +223,7 @@ impl DevicenetBus {
                 && drive.vain > if drive.stage == Stage::Ready { self.allowed_losses } else { BEGINNING }
             {
                 *told = true;
-                let axis = u8::try_from(drive.plan.axis).unwrap_or(u8::MAX);
+                let axis = axis_number(drive.plan.axis);
                 notice(Notice::SlaveAnswers { axis, mac: drive.plan.mac, error: *error });
             }
         }
@@ -421,7 +421,7 @@ impl Station for Node<'_> {
 }
 
 fn told(axis: usize, mac: MacId, failure: SetupFailure) -> Notice {
-    Notice::SlaveSetup { axis: u8::try_from(axis).unwrap_or(u8::MAX), mac, failure }
+    Notice::SlaveSetup { axis: axis_number(axis), mac, failure }
 }
 
 /// What an access came to.

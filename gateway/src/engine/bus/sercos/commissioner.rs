@@ -16,7 +16,7 @@ use super::{connections, limitations};
 use crate::engine::bus::commissioner::{CommissionerHandle, Context, Done, Run, Work};
 use crate::engine::bus::startup::{StartupAccess, StartupRun, When};
 use crate::engine::direct::DirectFailure;
-use crate::engine::notice::Notice;
+use crate::engine::notice::{Notice, axis_number};
 use crate::mapping::{DriveFacts, DriveProgram, Mapping, SercosAxis, SercosError, Step};
 use crate::parameter::id::Id;
 use crate::parameter::startup::StartupEntry;
@@ -85,7 +85,7 @@ impl<T: Copy + PartialEq> Setup<T> {
     pub fn new(drive: DriveSetup, allowed_losses: u16) -> Self {
         let DriveSetup { axis, address, needs, startup } = drive;
         Self {
-            axis: super::index(axis),
+            axis: axis_number(axis),
             address,
             needs,
             startup: StartupRun::new(&startup),

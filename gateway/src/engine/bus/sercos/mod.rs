@@ -38,7 +38,7 @@ use crate::engine::access::{Access, AccessFailure, Data, Operation, Progress, Re
 use crate::engine::axis::AxisChannel;
 use crate::engine::cyclic::Received;
 use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
-use crate::engine::notice::Notice;
+use crate::engine::notice::{Notice, axis_number};
 use crate::engine::port::{FRAME_MAX, SouthPort};
 use crate::mapping::{DriveFacts, DriveProgram, Full, Item, Mapping, SercosAxis, SercosError};
 use crate::status::{BusDetail, NodeStatus, PortLosses};
@@ -272,7 +272,7 @@ impl SercosBus {
     fn make_bare(&mut self, slave: SlaveId, notice: &mut dyn FnMut(Notice)) {
         for drive in self.drives.iter_mut().filter(|drive| drive.slave == Some(slave)) {
             drive.setup.needs.bare = true;
-            notice(Notice::Bare { axis: index(drive.axis), address: drive.setup.address });
+            notice(Notice::Bare { axis: axis_number(drive.axis), address: drive.setup.address });
         }
     }
 
@@ -357,7 +357,7 @@ impl SercosBus {
         let other = drive.slave.and_then(|slave| self.master.slave(slave)?.facts.fsp_type).and_then(no_drive);
         if let (Some(what), Some(slave)) = (other, drive.slave) {
             let error = SercosError::Profile(what);
-            notice(Notice::Program { axis: index(drive.axis), address: drive.setup.address, error });
+            notice(Notice::Program { axis: axis_number(drive.axis), address: drive.setup.address, error });
             drive.lose();
             let _ = self.refused.try_push(slave);
             let _ = self.master.exclude(slave);
@@ -367,7 +367,7 @@ impl SercosBus {
             drive.stage = Stage::Absent;
             // One that was refused has been reported with the reason.
             if !drive.hot_plug && found.is_none() {
-                notice(Notice::DriveMissing { axis: index(drive.axis), address: drive.setup.address });
+                notice(Notice::DriveMissing { axis: axis_number(drive.axis), address: drive.setup.address });
             }
         }
     }
@@ -942,10 +942,6 @@ pub(in crate::engine) fn failure(failure: SvcFailure) -> AccessFailure {
         0x006..=0x008 | 0x00D => Refusal::Value,
         _ => Refusal::Other,
     })
-}
-
-fn index(axis: usize) -> u8 {
-    u8::try_from(axis).unwrap_or(u8::MAX)
 }
 
 #[cfg(test)]
