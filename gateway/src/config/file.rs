@@ -295,7 +295,7 @@ pub struct IdentityTable {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UpdatePeriodTable {
-    /// Shortest period, at least the bus cycle. Default: `"1 ms"`, or the bus cycle if that is longer.
+    /// Shortest period, at least a quarter of the bus cycle. Default: `"1 ms"`, or the bus cycle if that is longer.
     #[schemars(transform = form::time)]
     pub min: Option<Spanned<String>>,
     /// Longest period. Default: `"32 ms"`, or the bus cycle if that is longer.
@@ -961,8 +961,9 @@ pub struct AttributeStartupTable {
     pub parameter: Spanned<String>,
     /// The value: a number, or a text as `axisbridge param read` shows it, such as `"hex:0a00"`.
     pub value: Spanned<Scalar>,
-    /// The type of the attribute, such as `"f32"` for a REAL or `"i8"` for a SINT. Default: that of the dictionary, which has the attributes
-    /// of the Motion Device Axis Object (class 66). Required of others, unless the value has its own type, as `"hex:0a00"` and `"u16:5"`.
+    /// The type of the attribute, such as `"f32"` for a REAL or `"i8"` for a SINT. Default: that of the dictionary, which has the Identity
+    /// object (class 1), the Motion Device Axis Object (class 66) of a CIP Motion drive, and Motor Data (28h), Control Supervisor (29h) and
+    /// AC/DC Drive (2Ah) of an AC/DC drive. Required of others, unless the value has its own type, as `"hex:0a00"` and `"u16:5"`.
     #[serde(rename = "type")]
     #[schemars(transform = form::word(Cia402Type::NAMED))]
     pub kind: Option<Spanned<String>>,

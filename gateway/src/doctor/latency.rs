@@ -40,6 +40,13 @@ pub struct Result {
     pub skipped: u64,
 }
 
+/// The longest trial of a cycle: as many wakes as are kept.
+#[must_use]
+pub fn longest(cycle: &Cycle) -> Duration {
+    let wakes = i64::try_from(WAKES_MAX).unwrap_or(i64::MAX);
+    Duration::from_nanos(cycle.time.as_nanos().saturating_mul(wakes).unsigned_abs())
+}
+
 /// Wakes at the beginning of each cycle for so long, on a thread of its own with what `request` asks of the kernel. Also says
 /// what the kernel granted.
 ///
@@ -198,6 +205,15 @@ mod tests {
         for (result, verdict, reason) in rows {
             assert_eq!((result.verdict(), result.reason().as_str()), (verdict, reason));
         }
+    }
+
+    #[test]
+    fn the_longest_trial_is_an_hour_of_a_millisecond_and_two_minutes_of_the_shortest_cycle() {
+        let of = |micros: i64, nanos: i64| {
+            let time = DurationNs(micros * 1_000 + nanos);
+            longest(&Cycle { time, ..result(&[], 0).cycle })
+        };
+        assert_eq!((of(1_000, 0).as_secs(), of(31, 250).as_secs()), (4_000, 125));
     }
 
     #[test]

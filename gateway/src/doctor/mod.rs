@@ -123,8 +123,10 @@ pub fn examine(config: Option<&Config>, each: Duration, mut tell: impl FnMut(&st
     let mut grants = Vec::new();
     let mut results = Vec::new();
     for cycle in cycles(config) {
-        tell(&format!("waking every {} for {} s", cycle.time, each.as_secs()));
-        let (granted, result) = latency::measure(cycle, each, request);
+        let time = latency::longest(&cycle).min(each);
+        let cut = if time < each { ", the longest trial of this cycle" } else { "" };
+        tell(&format!("waking every {} for {} s{cut}", cycle.time, time.as_secs()));
+        let (granted, result) = latency::measure(cycle, time, request);
         grants = granted;
         results.push(result);
     }

@@ -57,7 +57,11 @@ impl Ending {
         if !self.has_begun || self.is_over {
             return self.is_over;
         }
-        let awaited = || axes.iter().enumerate().zip(&self.awaited).filter(|(_, awaited)| **awaited);
+        // No axis gets torque any more; one that has it against that is waited for as well.
+        let still = |axis: &AxisChannel| axis.may_have_torque();
+        let awaited = || {
+            axes.iter().enumerate().zip(&self.awaited).filter(|((_, axis), awaited)| **awaited || still(axis))
+        };
         if now < self.deadline && !awaited().all(|((_, axis), _)| axis.has_stopped()) {
             return false;
         }

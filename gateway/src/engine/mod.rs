@@ -366,9 +366,10 @@ impl Engine {
 
     /// The axes of the buses that are due take what their drives sent.
     fn take_feedback(&mut self, now: MonotonicTime, due: &Due) {
-        let mut stepped = [false; BUSES_MAX];
+        let (mut stepped, mut off) = ([false; BUSES_MAX], [false; BUSES_MAX]);
         for (place, bus) in self.buses.iter_mut().enumerate() {
             stepped[place] = due[place].is_some() && bus.take_cycle();
+            off[place] = bus.next_cycle().is_none();
         }
         let system = self.clock.base.system_at(now);
         for (number, axis) in self.axes.iter_mut().enumerate() {
@@ -376,6 +377,9 @@ impl Engine {
             if stepped[place] {
                 let sampled = self.schedule.sampled_at(place, now);
                 axis.from_drive(now, system, sampled, self.buses.get(place).feedback(number));
+            } else if off[place] && axis.south().is_none() {
+                // No cycle comes on a bus that is off, and what waits for a time waits for no drive.
+                axis.tick(now, system);
             }
         }
     }

@@ -275,7 +275,7 @@ fn buses(families: &mut Families<'_>, status: &Overview) -> fmt::Result {
 }
 
 fn devices(families: &mut Families<'_>, status: &Overview) -> fmt::Result {
-    let help = "Open CIP Motion connections";
+    let help = "Open CIP Motion connections, and owners of assemblies";
     families.gauge("axisbridge_controller_connections", None, help, f64::from(status.connections))?;
     let devices = || status.devices.iter();
     let connected =

@@ -104,7 +104,9 @@ pub const BOX: &[Entry<BoxStatus>] = &[
         u64::from(status.phase)
     }),
     entry(3, Kind::U16, "axis_count", "configured axes", |status| u64::from(status.axis_count)),
-    entry(4, Kind::U16, "connections", "open CIP Motion connections", |status| u64::from(status.connections)),
+    entry(4, Kind::U16, "connections", "open CIP Motion connections, and owners of assemblies", |status| {
+        u64::from(status.connections)
+    }),
     entry(5, Kind::U16, "axes_address", "address of the first axis block: 64", |_| u64::from(AXES_ADDRESS)),
     entry(6, Kind::U16, "block_length", "registers of an axis block: 64", |_| u64::from(BLOCK_LEN)),
     entry(8, Kind::U32, "uptime", "seconds since the gateway started", |status| {

@@ -170,6 +170,10 @@ impl Walk {
                         next.clear_faults();
                     }
                 }
+                // Most happenings change nothing.
+                if next == walk.situations[at] {
+                    continue;
+                }
                 let to = *known.entry(next).or_insert_with(|| {
                     walk.situations.push(next);
                     walk.before.push(Vec::new());

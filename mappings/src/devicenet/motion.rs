@@ -182,11 +182,15 @@ const NODE_FAULTED: BitPattern = {
     BitPattern::new(bit, bit)
 };
 
-/// What the axis states of the drive are to the generic model. A fault of the node comes first.
+/// What the axis states of the drive are to the generic model. A fault of the node comes first; it takes no torque away.
 fn add_reports(program: &mut DriveProgram, tables: &CipTables) -> Result<(), DevicenetError> {
     let known = DriveState::ALL.iter().filter_map(|state| Some((*state, report_of(*state)?)));
     let known = known.map(|(state, report)| (shown(tables, state), report));
-    for (pattern, report) in std::iter::once((NODE_FAULTED, Report::Faulted)).chain(known) {
+    let with_torque = DriveState::ALL.iter().filter(|state| state.may_have_torque()).map(|state| {
+        let BitPattern { mask, value } = shown(tables, *state);
+        (BitPattern::new(mask | NODE_FAULTED.mask, value | NODE_FAULTED.value), Report::FaultReaction)
+    });
+    for (pattern, report) in with_torque.chain([(NODE_FAULTED, Report::Faulted)]).chain(known) {
         if !program.reports.push(pattern, report) {
             return Err(Full("the table of reports").into());
         }

@@ -149,6 +149,49 @@ fn package_has_each_file_in_its_place_with_owner_and_mode() {
 }
 
 #[test]
+fn package_needs_the_libc_that_the_program_asks_for() {
+    let Some(package) = package("package_needs_the_libc_that_the_program_asks_for") else { return };
+    let field = success(Command::new("dpkg-deb").arg("--field").arg(&package.file).arg("Depends"));
+    let needed = field.split_once("libc6 (>= ").and_then(|(_, rest)| rest.split_once(')')).expect("libc6").0;
+    let versions = success(Command::new("readelf").args(["--version-info", "--wide"]).arg(axisbridge()));
+    let number = |text: &str| -> Vec<u32> { text.split('.').filter_map(|part| part.parse().ok()).collect() };
+    let of_program = versions
+        .split("GLIBC_")
+        .skip(1)
+        .map(|rest| number(rest.split_whitespace().next().unwrap_or_default()))
+        .max()
+        .expect("the program calls libc");
+    assert_eq!(number(needed), of_program, "{field}");
+}
+
+#[test]
+fn program_for_another_architecture_is_refused() {
+    let test = "program_for_another_architecture_is_refused";
+    if !peer::has_program("dpkg-deb") {
+        peer::skip(test, "dpkg-deb");
+        return;
+    }
+    let other =
+        if cfg!(target_arch = "x86_64") { "aarch64-unknown-linux-gnu" } else { "x86_64-unknown-linux-gnu" };
+    for (target, expected) in [
+        (other, format!("error: {} is not a program for {other}", axisbridge().display())),
+        (
+            "riscv64gc-unknown-linux-gnu",
+            "error: there is no package for riscv64gc-unknown-linux-gnu: \
+             expected x86_64-unknown-linux-gnu or aarch64-unknown-linux-gnu"
+                .to_owned(),
+        ),
+    ] {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("package-refused");
+        let mut build = Command::new(Path::new(ROOT).join("packaging/build-deb"));
+        build.arg("--program").arg(axisbridge()).args(["--target", target, "--output"]).arg(&folder);
+        let output = build.output().expect("the script runs");
+        assert_eq!((output.status.code(), text_of(&output).trim()), (Some(1), &*expected));
+        assert!(!folder.exists(), "{} was made", folder.display());
+    }
+}
+
+#[test]
 fn sums_are_those_of_the_package() {
     let Some(package) = package("sums_are_those_of_the_package") else { return };
     let folder = package.file.parent().expect("the folder of the package");

@@ -14,6 +14,7 @@ use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::forward_open::ForwardOpenReply;
 use profile_generic::fault::FaultCause;
 use profile_generic::parameter::Parameter;
+use profile_generic::quantity::Torque;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 use profile_sercos::wire::idn::Idn;
@@ -765,6 +766,59 @@ fn cyclic_velocities_and_torques_are_followed() {
     assert!(!plc.is(Status::ENABLED), "{:?}", plc.status());
     plc.word(Control::ENABLE);
     plc.stays_off();
+}
+
+/// A load that the torque has held does not fall when another mode is asked for: in torque control nothing else would hold it.
+#[test]
+fn an_axis_that_leaves_torque_control_holds_its_position() {
+    for mode in [0, 1, 2] {
+        let mut plc = with(configuration("{ layout = \"mixed\" }"));
+        plc.connect();
+        plc.enable();
+        plc.output[2] = 5;
+        for _ in 0..25 {
+            plc.scan();
+        }
+        assert!(plc.is(Status::ENABLED | Status::STANDSTILL), "{:?}", plc.status());
+        plc.output[2] = mode;
+        for _ in 0..5 {
+            plc.scan();
+        }
+        plc.rig.drive_mut(0).servo_mut().set_load(Torque(50_000));
+        let place = plc.place();
+        for _ in 0..250 {
+            plc.scan();
+        }
+        assert!(plc.is(Status::ENABLED | Status::TORQUE), "{:?}", plc.status());
+        assert!((plc.place() - place).abs() < NANO / 100, "mode {mode}: {} after {place}", plc.place());
+        let torque = plc.rig.drive(0).actual().torque.get();
+        assert!(torque.abs() > 40_000, "mode {mode}: {torque} against the load");
+    }
+}
+
+/// The order of local control and the edge of a controller are numbered by each of them; the second reset is another one.
+#[test]
+fn a_reset_counts_whoever_has_given_one_before() {
+    let mut plc = plc("{}");
+    let (local, mut end) = LocalNorth::new(plc.rig.engine.axes().len());
+    plc.rig.engine.set_local(local);
+    let lost = |plc: &mut Plc| {
+        plc.connect();
+        plc.enable();
+        plc.open = None;
+        plc.rig.run_for(DurationNs::from_secs(2));
+        assert_eq!(plc.rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::COMMAND_LOST));
+    };
+    lost(&mut plc);
+    end.requests.push(Request::Order { client: 1, id: 1, axis: 0, order: Order::Reset }).expect("room");
+    plc.rig.run_for(DurationNs::from_secs(1));
+    assert_eq!(end.answers.pop().map(|answer| answer.result), Ok(Ok(None)));
+    lost(&mut plc);
+    plc.connect();
+    plc.word(Control::empty());
+    plc.run_for(20);
+    plc.word(Control::RESET);
+    plc.until(1_000, "the end of the fault", |plc| !plc.is(Status::FAULT));
 }
 
 /// The gateway of one axis with the assemblies of speed and torque; the motor has 1 Nm. Torque is in 1024ths of a newton metre.

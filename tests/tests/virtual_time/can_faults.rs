@@ -4,6 +4,7 @@
 //! The turntable (node 1) turns in velocity control without anybody looking after it, so that a drive that acts on an old
 //! set-point goes on and on. The slide (node 2) is on a long way at constant speed.
 
+use axisbridge::engine::axis::AxisChannel;
 use axisbridge::simulate::can_drive::drive;
 use axisbridge::status::BoxState;
 use axisbridge_tests::rig::motion::{NANO, both, millis};
@@ -191,6 +192,8 @@ fn a_box_that_is_bus_off_stops_every_axis_and_leads_them_again_when_it_is_back()
     told(&rig, "CAN bus 1: the controller is off the bus");
     let stands = [position(&rig, 0), position(&rig, 1)];
     rig.run(millis(60_000));
+    let states: Vec<_> = rig.engine.axes().iter().map(AxisChannel::state).collect();
+    assert_eq!(states, [DriveState::Faulted; 2], "nobody waits for ever on a bus without cycles");
     for (place, stands) in stands.into_iter().enumerate() {
         assert_eq!(codes(&rig, place), [(FaultType::AXIS_MFG, 17)], "{}", rig.told());
         assert!((position(&rig, place) - stands).abs() < NANO / 1_000);

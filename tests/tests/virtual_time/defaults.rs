@@ -9,6 +9,7 @@ use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
 use profile_cip::device::axis_state::AxisState;
+use profile_generic::state::Report;
 use profile_sercos::slave::parameter::Definition;
 use profile_sercos::wire::idn::Idn;
 
@@ -95,6 +96,25 @@ fn what_somebody_else_has_set_meanwhile_stays() {
     reconnect(&mut bench.rig);
     assert_eq!(drive_parameters::held(&bench, kpp), 700);
     assert_eq!(by_itself, 300);
+}
+
+/// A drive that is not heard for a moment keeps what the controller has set, and gives it back all the same.
+#[test]
+fn what_a_controller_has_changed_ends_with_its_connection_also_after_a_silence() {
+    let kpp = Idn::standard(104);
+    let (mut rig, client) = stopped(Rig::ready(Settings::default()));
+    let held = |rig: &Rig| rig.line.slaves()[0].store().number_of(kpp);
+    assert_eq!(client.ask(&mut rig, SET, 1, Some(441), &100.0_f32.to_le_bytes()).0, OK);
+    assert_eq!(held(&rig), 600, "300 before");
+    rig.line.set_mute(0, true);
+    rig.run_until(millis(100), "the silence", |rig| rig.engine.axes()[0].feedback().report == Report::Silent);
+    rig.line.set_mute(0, false);
+    rig.run_until(millis(1_000), "the drive", |rig| rig.engine.axes()[0].feedback().report != Report::Silent);
+    rig.kill_controller();
+    rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
+    rig.connect(vec![Step::Dwell { seconds: 100_000.0 }]);
+    rig.run_for(millis(5_000));
+    assert_eq!(held(&rig), 300, "{}", rig.told());
 }
 
 /// A drive that does not take back what it had keeps what the controller has set, and the log says so.

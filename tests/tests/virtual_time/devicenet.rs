@@ -3,6 +3,7 @@
 //! Where something goes wrong, the turntable (MAC ID 5) turns in velocity control, so that a drive that acts on an old set-point
 //! goes on and on, and the slide (MAC ID 9) is on a long way at constant speed, and goes on.
 
+use axisbridge::engine::axis::AxisChannel;
 use axisbridge::simulate::devicenet_drive::DevicenetNode;
 use axisbridge::simulate::program::{self, AxisPlan};
 use axisbridge::status::BoxState;
@@ -356,6 +357,8 @@ fn a_box_that_is_bus_off_stops_both_axes_and_leads_them_again_when_it_is_back() 
     rig.run_until(millis(1_500), "rest", still);
     let stands = [position(&rig, 0), position(&rig, 1)];
     rig.run(millis(60_000));
+    let states: Vec<_> = rig.engine.axes().iter().map(AxisChannel::state).collect();
+    assert_eq!(states, [DriveState::Faulted; 2], "nobody waits for ever on a bus without cycles");
     for (axis, stands) in stands.into_iter().enumerate() {
         assert_eq!(codes_of(&rig, axis), [(FaultType::AXIS_MFG, 17)], "{}", rig.told());
         assert!((position(&rig, axis) - stands).abs() < NANO / 1_000);
@@ -433,7 +436,17 @@ fn a_fault_of_a_node_stops_its_axis_until_it_is_reset() {
         with_node_fault(frame);
         true
     }));
-    BUS.stops_within(&mut rig, 1_000);
+    // The fault takes no torque away: the drive brakes with it.
+    let torque =
+        |rig: &Rig| rig.devicenet[0].bus.nodes().next().expect("a drive").actual().report.has_torque();
+    let (mut with, end) = (0, rig.now() + millis(1_000));
+    BUS.go(&mut rig, 2_000, "a second", |rig| {
+        with += i32::from(torque(rig));
+        assert!(!torque(rig) || rig.engine.axes()[0].may_have_torque(), "{}", rig.told());
+        rig.now() >= end
+    });
+    assert!(with > 10 && !torque(&rig), "{with}");
+    BUS.stops_within(&mut rig, 1);
     // The axis of the drive knows of no fault, and half a second is waited for a cause.
     BUS.go_for(&mut rig, 500);
     assert_eq!(codes(&rig), [(FaultType::AXIS_MFG, 1)], "{}", rig.told());

@@ -5,12 +5,14 @@ use axisbridge::engine::axis::rest::Unrested;
 use axisbridge_tests::rig::motion::{NANO, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_cip::controller::{AxisSet, Step};
+use profile_cip::wire::motion::codes::{AxisControl, ControlMode};
 use profile_generic::quantity::{Acceleration, Torque, Velocity};
 use profile_generic::servo::ServoParameters;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 
 use super::beside::connect;
+use super::stopping::request;
 
 /// The turntable turns at 2 rev/s; its drive is another one, and stops as configured when commands stay away.
 fn turning(on_command_loss: &str, drive: impl Fn(ServoParameters) -> ServoParameters) -> Rig {
@@ -108,6 +110,30 @@ fn a_drive_that_is_lost_while_it_stops_is_not_known_to_stand() {
     let [Unrested { axis: 0, velocity: None, .. }] = *rig.engine.unrested() else {
         panic!("{:?}", rig.engine.unrested())
     };
+}
+
+/// While one axis stops as its controller wants, the controller wants to switch the other one on.
+#[test]
+fn no_axis_is_switched_on_while_the_box_ends() {
+    let mut rig = Rig::ready(Settings::default());
+    let run = Step::RunAt { axis: 2, velocity: 100.0, acceleration: 1_000.0, jerk: 20_000.0 };
+    let (slide, dwell) = (AxisSet::one(2), Step::Dwell { seconds: 1.0 });
+    let mut config = rig.controller_config();
+    config.axes[1].control_mode = ControlMode::VELOCITY;
+    rig.connect_with(config, vec![Step::Enable(slide), run, dwell, Step::Disable(slide)]);
+    rig.run_until(millis(10_000), "the speed", |rig| rig.velocity(1) > 99 * NANO);
+    let servo = rig.drive_mut(1).servo_mut();
+    let slow = ServoParameters { deceleration_limit: Acceleration(20 * NANO), ..*servo.parameters() };
+    servo.set_parameters(slow).expect("such a servo exists");
+    rig.run_until(millis(5_000), "the stop", |rig| rig.engine.axes()[1].state() == DriveState::Stopping);
+    stop(&mut rig);
+    request(&mut rig, AxisControl::ENABLE);
+    let took = rig.run_until(millis(30_000), "the end", |rig| {
+        assert!(!rig.watched[0].on && !rig.engine.axes()[0].may_have_torque(), "{}", rig.told());
+        rig.engine.is_stopped()
+    });
+    assert!(took > millis(1_000), "{took}");
+    assert_eq!(rig.engine.unrested(), []);
 }
 
 /// Drives that are not heard any more because the box takes its buses down are nothing to be told of.

@@ -5,18 +5,23 @@ use axisbridge::engine::local::{
     Answer, ClientEnd, Failure, Generator, JOG_TIME, Jog, LocalNorth, Move, Order, Request,
 };
 use axisbridge_tests::rig::{BOX, Rig, Settings};
-use profile_cip::controller::{AxisSet, Step};
+use profile_cip::controller::{AttributeSet, AxisSet, Step};
 use profile_generic::capture::CaptureWindow;
 use profile_generic::fault::FaultCause;
 use profile_generic::mode::{ModeSelection, OperatingMode};
-use profile_generic::quantity::{Acceleration, Position, Velocity};
+use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
+use profile_generic::servo::ServoParameters;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 use profile_sercos::wire::idn::Idn;
 
+use super::beside::connect;
+
 const NANO: i64 = 1_000_000_000;
 const TURNTABLE: u8 = 0;
 const SLIDE: u8 = 1;
+/// Number of the attribute Flying Start Enable.
+const FLYING_START_ENABLE: u16 = 380;
 
 /// A box with local control, and its clients.
 struct Bench {
@@ -221,6 +226,11 @@ fn a_stop_ends_a_way_that_the_drive_makes() {
     let early = bench.give(1, TURNTABLE, jog(NANO));
     let answer = bench.answer(10);
     assert_eq!((answer.id, answer.result), (early, Err(Failure::Stopping)));
+    for order in [Order::Enable, Order::Reset] {
+        let early = bench.give(1, TURNTABLE, order);
+        let answer = bench.answer(10);
+        assert_eq!((answer.id, answer.result), (early, Err(Failure::Stopping)), "{order:?}");
+    }
     let answer = bench.answer(5_000);
     assert_eq!((answer.id, answer.result), (stop, Ok(None)));
     let here = bench.place(TURNTABLE);
@@ -228,6 +238,41 @@ fn a_stop_ends_a_way_that_the_drive_makes() {
     assert!((bench.place(TURNTABLE) - here).abs() < NANO / 100, "it stays where it stopped");
     assert_eq!(bench.state(TURNTABLE), DriveState::Operating);
     assert_eq!(bench.order(TURNTABLE, Order::Move(to(0, 5 * NANO, None))), Ok(()), "and goes on");
+}
+
+/// The controller that was lost would have caught the axis at its speed. Nobody leads on what a person enables.
+#[test]
+fn an_enable_holds_an_axis_that_still_turns() {
+    let coast = "on_command_loss = \"disable-and-coast\"\ninstance = ";
+    let configuration = configuration(ALL).replace("instance = ", coast);
+    let mut rig = Rig::ready(Settings { configuration, ..Settings::default() });
+    let servo = rig.drive_mut(0).servo_mut();
+    let parameters = *servo.parameters();
+    let free = ServoParameters { coulomb_friction: Torque(0), viscous_friction: Torque(0), ..parameters };
+    servo.set_parameters(free).expect("such a servo exists");
+    let catches = AttributeSet::usint(FLYING_START_ENABLE, 1);
+    let turn = Step::RunAt { axis: 1, velocity: 2.0, acceleration: 20.0, jerk: 400.0 };
+    let program = vec![
+        Step::SetAttributes { axis: 1, attributes: vec![catches] },
+        Step::Enable(AxisSet::one(1)),
+        turn,
+        Step::Dwell { seconds: 500.0 },
+    ];
+    connect(&mut rig, program);
+    rig.run_until(DurationNs::from_secs(10), "the speed", |rig| rig.velocity(0) > 199 * NANO / 100);
+    rig.kill_controller();
+    rig.run_until(DurationNs::from_secs(5), "the loss", |rig| rig.status().connections == 0);
+    rig.run_for(DurationNs::from_millis(100));
+    assert!(rig.torque_free());
+    let (local, end) = LocalNorth::new(rig.engine.axes().len());
+    rig.engine.set_local(local);
+    let mut bench = Bench { rig, end, ids: 0 };
+    assert_eq!(bench.order(TURNTABLE, Order::Reset), Ok(()));
+    assert!(bench.speed(TURNTABLE) > 19 * NANO / 10, "it turns still: {}", bench.speed(TURNTABLE));
+    assert_eq!(bench.order(TURNTABLE, Order::Enable), Ok(()));
+    bench.run_for(2_000);
+    assert!(bench.speed(TURNTABLE).abs() < NANO / 100, "{}", bench.speed(TURNTABLE));
+    assert_eq!(bench.state(TURNTABLE), DriveState::Operating);
 }
 
 #[test]
@@ -406,9 +451,15 @@ fn a_canopen_drive_positions_and_homes_by_itself() {
     assert_eq!(bench.order(TURNTABLE, Order::Move(to(3 * NANO, 2 * NANO, Some(Generator::Drive)))), Ok(()));
     let place = actual(&bench).position.get();
     assert!((place - 3 * NANO).abs() < NANO / 1_000, "{place}");
-    // Method 37: the position where the axis stands becomes the home offset.
-    let node = bench.rig.can[0].bus.nodes_mut().next().expect("a device");
-    node.dictionary_mut().set(0x6098, 0, 37);
+    // No method at all: the drive refuses.
+    let method = |bench: &mut Bench, method| {
+        let node = bench.rig.can[0].bus.nodes_mut().next().expect("a device");
+        node.dictionary_mut().set(0x6098, 0, method);
+    };
+    method(&mut bench, 0);
+    assert_eq!(bench.order(TURNTABLE, Order::Home), Err(Failure::HomingFailed));
+    // Method 37: the position where the axis stands becomes the home offset. What is answered is of this homing.
+    method(&mut bench, 37);
     assert_eq!(bench.order(TURNTABLE, Order::Home), Ok(()));
     let feedback = *bench.rig.engine.axes()[0].feedback();
     assert!(feedback.position.get().abs() < NANO / 1_000, "{feedback:?}");

@@ -3,7 +3,7 @@
 
 use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
-use profile_cip::controller::{AxisSet, Limits, Step};
+use profile_cip::controller::{AxisSet, ControllerConfig, Limits, Step};
 use profile_generic::fault::FaultCause;
 use profile_generic::state::DriveState;
 use profile_sercos::wire::idn::Idn;
@@ -174,6 +174,36 @@ fn a_scaling_that_cannot_be_converted_is_told_with_drive_idn_and_value() {
         assert!(refused, "expected {line}\n{told}");
         assert_eq!(rig.engine.axes()[0].state(), DriveState::NotReady);
         assert_ne!(rig.engine.axes()[1].state(), DriveState::NotReady, "{told}");
+    }
+}
+
+/// What was wrong may have been read wrongly, or is over: while nobody uses the bus, a drive that was left out is looked at again.
+#[test]
+fn a_drive_that_was_left_out_is_tried_again_while_no_controller_is_connected() {
+    for connected in [false, true] {
+        let mut rig = Rig::new(Settings::default());
+        let scaling = rig.line.slaves()[0].store().number_of(Idn::standard(76));
+        preset(&mut rig, 0, &[(76, 0)]);
+        rig.run_until(millis(20_000), "the bus in CP4", |rig| rig.status().phase == 4);
+        rig.run_for(millis(100));
+        assert!(rig.told().contains("S-0-0076") && rig.engine.axes()[0].south().is_none(), "{}", rig.told());
+        rig.line.slaves_mut()[0].preset(Idn::standard(76), scaling);
+        if connected {
+            let config = ControllerConfig { late: AxisSet::one(1), ..rig.controller_config() };
+            rig.connect_with(config, vec![Step::Enable(AxisSet::one(2)), Step::Dwell { seconds: 500.0 }]);
+            let end = rig.now() + millis(60_000);
+            rig.run_until(millis(61_000), "a minute", |rig| {
+                assert_eq!(rig.status().phase, 4);
+                rig.now() >= end
+            });
+            continue;
+        }
+        let took = rig.run_until(millis(20_000), "the drive", |rig| rig.engine.axes()[0].south().is_some());
+        assert!(took > millis(9_000), "{took}");
+        rig.run_until(millis(5_000), "both drives", |rig| {
+            rig.status().phase == 4
+                && rig.engine.axes().iter().all(|axis| axis.state() != DriveState::NotReady)
+        });
     }
 }
 

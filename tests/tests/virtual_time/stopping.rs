@@ -52,7 +52,7 @@ const STATE_AT: usize = 7;
 
 /// Replaces the request of the turntable in everything that the controller sends from now on. The controller is shown a
 /// Running axis that answers nothing, so that it goes on with what it does.
-fn request(rig: &mut Rig, request: AxisControl) {
+pub(super) fn request(rig: &mut Rig, request: AxisControl) {
     rig.tamper_command = Some(Box::new(move |bytes| {
         let data = &bytes.as_slice()[CLASS1_HEADER_LEN..];
         let frame = CommandFrame::parse(data).ok();

@@ -225,7 +225,7 @@ impl PlcAxis {
         let connected = axis.has_controller();
         if connected && !self.connected {
             axis.set_stop_settings(self.stops);
-            axis.end_set_points();
+            axis.begin_north();
             self.refusal = Refusal::NONE;
         }
         self.connected = connected;
@@ -297,6 +297,12 @@ impl PlcAxis {
             (self.last, self.torque) = (None, None);
             // Nobody has set-points until there is another source: the axis holds its position.
             axis.end_set_points();
+            if is_pushed(axis) {
+                self.brake(around, axis);
+                if self.handshake.state() != State::Enabled {
+                    return;
+                }
+            }
         }
         if reaction.contains(Reaction::HALT) {
             return self.brake(around, axis);
@@ -437,7 +443,7 @@ impl PlcAxis {
         let mode = match &self.source {
             Source::Generator(generator) => Some(generator.mode),
             // It holds the position at which it was enabled.
-            Source::None if self.standstill.is_reached(around.now.0) => return,
+            Source::None if self.standstill.is_reached(around.now.0) && !is_pushed(axis) => return,
             Source::None | Source::Cyclic => generator::run_mode(axis).ok(),
         };
         let torque = self.mode == mode::CYCLIC_TORQUE;
@@ -618,6 +624,11 @@ fn refusal(misfit: Misfit) -> Refusal {
         Misfit::TooSteep(_) => Refusal::TOO_STEEP,
         Misfit::Beyond(_) => Refusal::BEYOND_LIMIT,
     }
+}
+
+/// Whether the drive of an axis is in torque control, where nothing holds it.
+fn is_pushed(axis: &AxisChannel) -> bool {
+    axis.command().mode == OperatingMode::Torque
 }
 
 fn is_faulted(axis: &AxisChannel) -> bool {

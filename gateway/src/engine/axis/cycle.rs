@@ -181,7 +181,8 @@ impl AxisChannel {
     }
 
     /// Time passes in a state that has a limit.
-    fn tick(&mut self, now: MonotonicTime, system: SystemTime) {
+    /// Time passes, without a telegram of the drive.
+    pub fn tick(&mut self, now: MonotonicTime, system: SystemTime) {
         let limit = match self.state() {
             DriveState::Starting => Some(START_TIME_OUT),
             // A hold is a stop that has ended.
@@ -487,7 +488,7 @@ impl AxisChannel {
     // ---- the state machine -------------------------------------------------------------------------------------
 
     pub(in crate::engine) fn request(&mut self, now: MonotonicTime, system: SystemTime, request: Request) {
-        if !self.moves && matches!(request, Request::Enable | Request::Test) {
+        if (!self.moves || self.ends) && matches!(request, Request::Enable | Request::Test) {
             return;
         }
         let transition = self.drive.machine.request(request);

@@ -183,6 +183,8 @@ pub enum Loss {
 pub struct AxisChannel {
     /// It may be switched on.
     moves: bool,
+    /// The box ends: it is not switched on any more.
+    ends: bool,
     drive: Drive,
     command: AxisCommand,
     feedback: AxisFeedback,
@@ -228,6 +230,7 @@ impl AxisChannel {
         let since = MonotonicTime::default();
         Self {
             moves,
+            ends: false,
             drive: Drive { machine: BasicDrive::default(), since, action: Action::TorqueOff },
             command: AxisCommand::default(),
             feedback: AxisFeedback::default(),

@@ -6,7 +6,9 @@
 
 use super::guard::Finding;
 use super::set_points::{Before, Updates};
-use super::{AxisChannel, Intent, Loss, NorthPoints, Owner, Reactions, StopSettings, Target, Wish};
+use super::{
+    AxisChannel, Intent, Loss, NorthPoints, Owner, ProcedureUnit, Reactions, StopSettings, Target, Wish,
+};
 use profile_generic::fault::{Fault, FaultCause, Reaction};
 use profile_generic::hookup::TestOrder;
 use profile_generic::image::{AxisCommand, StatusBits};
@@ -117,6 +119,9 @@ impl AxisChannel {
 
     fn carry_out_wish(&mut self, now: MonotonicTime, system: SystemTime) {
         let Wish { intent, request } = self.orders.wish();
+        if self.ends && matches!(intent, Intent::Enable | Intent::Test) {
+            return;
+        }
         self.leave_hold(now, system, intent);
         let torque = self.may_have_torque();
         match intent {
@@ -198,8 +203,9 @@ impl AxisChannel {
         self.lose_command(now, system, Loss::Silent);
     }
 
-    /// The gateway ends: the axis stops as on a lost command, but without holding torque.
+    /// The gateway ends: the axis stops as on a lost command, but without holding torque, and is not switched on again.
     pub fn end(&mut self, now: MonotonicTime, system: SystemTime) {
+        self.ends = true;
         self.faults.command_loss = self.faults.command_loss.max(Reaction::DecelerateAndDisable);
         self.lose_command(now, system, Loss::End);
         self.end_hold(now, system);
@@ -226,6 +232,20 @@ impl AxisChannel {
     #[must_use]
     pub fn begins(&self, selection: ModeSelection) -> bool {
         self.set_points.begins(&self.command, selection)
+    }
+
+    /// Another north side has the axis: its commands and set-points count by numbers of its own.
+    pub fn begin_north(&mut self) {
+        self.orders.forget_number();
+        self.end_set_points();
+    }
+
+    /// A procedure that is still chosen and over is carried out again.
+    pub fn repeat_procedure(&mut self) {
+        if self.procedure.repeat() {
+            // What it showed was of the one before.
+            self.feedback.status.remove(ProcedureUnit::STATUS);
+        }
     }
 
     /// The north side has no set-points: the next ones are the first.
@@ -357,6 +377,9 @@ impl AxisChannel {
     fn take_request(&mut self, now: MonotonicTime, system: SystemTime, request: Request) {
         if request == Request::FaultReset {
             self.begin_reset(now, system, self.reset_id());
+            return;
+        }
+        if request == Request::Enable && self.ends {
             return;
         }
         if request == Request::Enable && self.halts() {

@@ -128,6 +128,11 @@ impl Orders {
         self.requested.replace(sequence) != Some(sequence)
     }
 
+    /// The next request is of somebody who counts by himself.
+    pub fn forget_number(&mut self) {
+        self.requested = None;
+    }
+
     /// The reset that was carried out last.
     pub fn reset_id(&self) -> u32 {
         self.reset_id
@@ -217,5 +222,7 @@ mod tests {
     fn a_request_counts_once() {
         let mut orders = Orders::default();
         assert!(orders.is_new(0) && !orders.is_new(0) && orders.is_new(1) && orders.is_new(0));
+        orders.forget_number();
+        assert!(orders.is_new(0) && !orders.is_new(0), "of somebody else");
     }
 }

@@ -287,9 +287,10 @@ impl Accesses {
     }
 
     fn give_back(&mut self, on: &Accessed<'_>, buses: &mut Buses) {
-        if on.is_gone() {
+        if on.axis.south().is_none() {
+            // It is commissioned anew. One that is not heard for a moment has what it had.
             self.originals.forget_all();
-        } else if !on.axis.may_have_torque() {
+        } else if !on.is_gone() && !on.axis.may_have_torque() {
             let (number, purpose) = (on.axis_number, on.original(true));
             self.originals.advance(|request| buses.access(number, request, purpose));
         }

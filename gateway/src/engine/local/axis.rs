@@ -93,11 +93,13 @@ impl LocalAxis {
         axis.set_reactions(now, system, &reactions);
         self.source = Source::None;
         axis.set_local_control(true);
-        axis.end_set_points();
+        axis.begin_north();
         axis.keep_updates(UPDATES);
         // A disable ends without torque, whatever Stopping Action a controller had set.
         let mut settings = *axis.stop_settings();
         settings.plan.hold = false;
+        // An enable holds the axis: nobody would lead on one that is caught at its speed.
+        settings.flying_start = false;
         axis.set_stop_settings(settings);
     }
 
@@ -127,6 +129,10 @@ impl LocalAxis {
         (client, id, order): (ClientId, u32, Order),
     ) -> Result<Option<Task>, Failure> {
         match order {
+            // The stop of a movement of the drive ends with its halt.
+            Order::Enable | Order::Reset if self.halts(axis) => {
+                return Err(Failure::Stopping);
+            }
             Order::Enable => {}
             Order::Disable => self.disable(now, axis),
             Order::Stop => self.stop(now, axis),
@@ -204,11 +210,18 @@ impl LocalAxis {
     fn home(&mut self, now: Now, axis: &mut AxisChannel) -> Result<(), Failure> {
         check_enabled(axis)?;
         check_mode(axis, HOMING)?;
+        axis.repeat_procedure();
         let mut command = AxisCommand::default();
         command.select(HOMING);
         self.source = Source::Drive;
         self.send(now, axis, command);
         Ok(())
+    }
+
+    /// Whether a movement of the drive is being stopped.
+    fn halts(&self, axis: &AxisChannel) -> bool {
+        let halts = axis.state() == DriveState::Operating && axis.action() == Action::Halt;
+        halts && matches!(self.source, Source::Drive)
     }
 
     /// Brings the axis to standstill, and cancels a start in progress.

@@ -137,6 +137,15 @@ impl ProcedureUnit {
         *self = Self { generation: self.generation.wrapping_add(1), left_over, ..Self::default() };
     }
 
+    /// One that is over is begun anew if it is still wanted; returns whether one was over.
+    pub fn repeat(&mut self) -> bool {
+        let is_over = matches!(self.stage, Stage::Ended(_));
+        if is_over {
+            (self.stage, self.homed) = (Stage::Idle, false);
+        }
+        is_over
+    }
+
     /// Tells what is wanted, in every cycle in which the drive was heard.
     pub fn want(&mut self, wanted: Option<&Procedure>, around: &Surroundings) {
         let same = wanted.filter(|procedure| procedure.selection == self.selection);

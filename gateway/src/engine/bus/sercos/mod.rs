@@ -29,7 +29,7 @@ use profile_sercos::wire::scp::ScpClass;
 
 use self::commissioner::{DriveSetup, DriveWork, Made, Order, Progress as SetupProgress, Setup};
 use self::progress::PhaseProgress;
-use self::recovery::Recovery;
+use self::recovery::{Missing, Recovery};
 use super::accesses::Accesses;
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
 use super::direct_slot::DirectSlot;
@@ -210,8 +210,8 @@ impl SercosBus {
             Event::Phase(Phase::CP4) => {
                 let fit = self.drives.iter_mut().filter(|drive| drive.slave.is_some());
                 fit.for_each(|drive| drive.setup.unfit = false);
-                let is_complete = self.is_complete();
-                self.recovery.reach_cp4(now, is_complete);
+                let missing = self.missing();
+                self.recovery.reach_cp4(now, missing);
             }
             Event::SlaveLost { slave, address, phase } => {
                 if !self.comes_by_hot_plug(*slave, *address) {
@@ -276,9 +276,20 @@ impl SercosBus {
         }
     }
 
-    /// Whether every drive is there that cannot come later.
-    fn is_complete(&self) -> bool {
-        self.drives.iter().all(|drive| drive.slave.is_some() || drive.hot_plug)
+    /// What the bus is without. A drive that was left out does not come by hot plug either: it is there.
+    fn missing(&self) -> Missing {
+        let mut gone = self.drives.iter().filter(|drive| drive.slave.is_none()).peekable();
+        if gone.peek().is_none() {
+            return Missing::None;
+        }
+        let is_found = |drive: &Drive| self.master.slave_by_address(drive.setup.address).is_some();
+        if gone.clone().any(is_found) {
+            Missing::LeftOut
+        } else if gone.all(|drive| drive.hot_plug) {
+            Missing::None
+        } else {
+            Missing::Absent
+        }
     }
 
     /// Goes on without a slave.
@@ -425,7 +436,7 @@ impl SercosBus {
     fn complete_joining(&mut self, slave: SlaveId) {
         let drive = self.drives.iter_mut().find(|drive| drive.slave == Some(slave));
         drive.into_iter().for_each(|drive| drive.stage = Stage::Ready);
-        if self.is_complete() {
+        if self.missing() == Missing::None {
             self.recovery.complete();
         }
     }

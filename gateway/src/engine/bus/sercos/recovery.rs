@@ -12,6 +12,16 @@ const PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
 /// Pause before a failed phase-up is tried again; it doubles while a drive is refused that only another configuration can help.
 const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
 
+/// Which drives a bus is without that cannot come later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Missing {
+    None,
+    /// One that was not found.
+    Absent,
+    /// One that was found and left out: what was wrong may have been read wrongly, or is over.
+    LeftOut,
+}
+
 /// What the bus does about drives that are missing.
 #[derive(Debug)]
 pub(super) struct Recovery {
@@ -91,14 +101,15 @@ impl Recovery {
     }
 
     /// The bus is in CP4, with all drives or without some.
-    pub(super) fn reach_cp4(&mut self, now: MonotonicTime, is_complete: bool) {
+    pub(super) fn reach_cp4(&mut self, now: MonotonicTime, missing: Missing) {
         self.planned = false;
         self.retry_pause = RETRY_PAUSE;
-        if is_complete {
-            self.rescan_pause = RESCAN_PAUSE;
-        } else if self.rescan_pause > RESCAN_PAUSE {
+        match missing {
+            Missing::None => self.rescan_pause = RESCAN_PAUSE,
+            Missing::LeftOut => self.lost_since = Some(now),
             // It was there once and is missing after a new scan: it is looked for again, ever more rarely.
-            self.lost_since = Some(now);
+            Missing::Absent if self.rescan_pause > RESCAN_PAUSE => self.lost_since = Some(now),
+            Missing::Absent => {}
         }
     }
 
@@ -148,7 +159,7 @@ mod tests {
         let mut recovery = Recovery::new();
         let unfit: Vec<_> = (0..10).map(|_| up_after(&mut recovery, 0, true)).collect();
         assert_eq!(unfit, [2, 4, 8, 16, 32, 64, 128, 256, 320, 320]);
-        recovery.reach_cp4(NOW, true);
+        recovery.reach_cp4(NOW, Missing::None);
         assert_eq!((0..3).map(|_| up_after(&mut recovery, 0, false)).collect::<Vec<_>>(), [2, 2, 2]);
         recovery.end();
         assert!(!recovery.wants_up(MonotonicTime::MAX, false), "the box ends");
@@ -180,12 +191,26 @@ mod tests {
             assert!(!recovery.wants_scan(s(seconds)) && recovery.wants_scan(s(seconds + 1)), "{seconds}");
             recovery.take_down(true);
             assert!(recovery.is_planned());
-            recovery.reach_cp4(NOW, false);
+            recovery.reach_cp4(NOW, Missing::Absent);
             assert!(!recovery.is_planned());
         }
         recovery.complete();
         assert!(!recovery.wants_scan(MonotonicTime::MAX));
-        recovery.reach_cp4(NOW, false);
+        recovery.reach_cp4(NOW, Missing::Absent);
         assert!(!recovery.wants_scan(MonotonicTime::MAX), "one that never came is not looked for");
+    }
+
+    #[test]
+    fn a_drive_that_was_found_and_left_out_is_tried_again_ever_more_rarely() {
+        let mut recovery = Recovery::new();
+        for seconds in [10, 20, 40, 80, 160, 320, 320] {
+            recovery.reach_cp4(NOW, Missing::LeftOut);
+            assert!(!recovery.wants_scan(s(seconds)) && recovery.wants_scan(s(seconds + 1)), "{seconds}");
+            recovery.take_down(true);
+        }
+        recovery.reach_cp4(NOW, Missing::None);
+        assert!(!recovery.wants_scan(MonotonicTime::MAX));
+        recovery.reach_cp4(NOW, Missing::LeftOut);
+        assert!(recovery.wants_scan(s(11)), "as soon as at first");
     }
 }
