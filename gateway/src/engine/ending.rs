@@ -58,9 +58,9 @@ impl Ending {
             return self.is_over;
         }
         // No axis gets torque any more; one that has it against that is waited for as well.
-        let still = |axis: &AxisChannel| axis.may_have_torque();
         let awaited = || {
-            axes.iter().enumerate().zip(&self.awaited).filter(|((_, axis), awaited)| **awaited || still(axis))
+            let all = axes.iter().enumerate().zip(&self.awaited);
+            all.filter(|((_, axis), awaited)| **awaited || axis.may_have_torque())
         };
         if now < self.deadline && !awaited().all(|((_, axis), _)| axis.has_stopped()) {
             return false;

@@ -56,7 +56,7 @@ pub struct Overview {
     pub state: String,
     /// Communication phase of the SERCOS bus, where there is one.
     pub sercos_phase: Option<u8>,
-    /// Open CIP Motion connections.
+    /// Open CIP Motion connections, and owners of assemblies.
     pub connections: u8,
     /// Seconds since the start.
     pub uptime_s: f64,

@@ -261,7 +261,7 @@ pub struct BoxStatus {
     pub state: BoxState,
     /// SERCOS communication phase 0 to 4, or [`PHASE_NONE`].
     pub phase: u8,
-    /// CIP Motion connections open.
+    /// Open CIP Motion connections, and owners of assemblies.
     pub connections: u8,
     /// Buses; the rest of `buses` is [`BusStatus::NONE`].
     pub bus_count: u8,

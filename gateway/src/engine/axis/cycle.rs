@@ -180,8 +180,7 @@ impl AxisChannel {
         self.tick(now, system);
     }
 
-    /// Time passes in a state that has a limit.
-    /// Time passes, without a telegram of the drive.
+    /// Time passes, without a telegram of the drive: states and resets that have a limit come to it.
     pub fn tick(&mut self, now: MonotonicTime, system: SystemTime) {
         let limit = match self.state() {
             DriveState::Starting => Some(START_TIME_OUT),
@@ -488,7 +487,7 @@ impl AxisChannel {
     // ---- the state machine -------------------------------------------------------------------------------------
 
     pub(in crate::engine) fn request(&mut self, now: MonotonicTime, system: SystemTime, request: Request) {
-        if (!self.moves || self.ends) && matches!(request, Request::Enable | Request::Test) {
+        if !self.may_start() && matches!(request, Request::Enable | Request::Test) {
             return;
         }
         let transition = self.drive.machine.request(request);

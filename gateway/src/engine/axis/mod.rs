@@ -290,6 +290,11 @@ impl AxisChannel {
         self.moves
     }
 
+    /// Whether it may be switched on now, whoever asks.
+    const fn may_start(&self) -> bool {
+        self.moves && !self.ends
+    }
+
     /// Where in a start or stop the axis is.
     #[must_use]
     pub fn sequence_step(&self) -> SequenceStep {

@@ -119,13 +119,12 @@ impl AxisChannel {
 
     fn carry_out_wish(&mut self, now: MonotonicTime, system: SystemTime) {
         let Wish { intent, request } = self.orders.wish();
-        if self.ends && matches!(intent, Intent::Enable | Intent::Test) {
+        if !self.may_start() && matches!(intent, Intent::Enable | Intent::Test) {
             return;
         }
         self.leave_hold(now, system, intent);
         let torque = self.may_have_torque();
         match intent {
-            Intent::Enable if !self.moves => {}
             // What a test is led by is torque: it ends by the drive's own deceleration, not by a ramp of the box.
             Intent::Standby | Intent::Disable if torque && self.start_stop.started_for_test => {
                 self.request(now, system, Request::Disable);
@@ -379,10 +378,7 @@ impl AxisChannel {
             self.begin_reset(now, system, self.reset_id());
             return;
         }
-        if request == Request::Enable && self.ends {
-            return;
-        }
-        if request == Request::Enable && self.halts() {
+        if request == Request::Enable && self.halts() && self.may_start() {
             // The torque is there already, and what the axis was led by is of before the halt.
             self.prepare_start(now);
         }
@@ -403,7 +399,7 @@ impl AxisChannel {
     }
 
     /// Whether the axis was halted in operation.
-    fn halts(&self) -> bool {
+    pub fn halts(&self) -> bool {
         self.state() == DriveState::Operating && self.drive.action == Action::Halt
     }
 

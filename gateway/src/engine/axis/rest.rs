@@ -1,6 +1,7 @@
 //! Whether an axis stands: what the end of the box waits for, and what is done when another master is on the bus.
 
 use super::AxisChannel;
+use crate::engine::notice::axis_number;
 use profile_generic::image::FeedbackSet;
 use profile_generic::quantity::Velocity;
 use profile_generic::state::{DriveState, Report};
@@ -58,5 +59,5 @@ pub(super) fn unrested(axis: &AxisChannel, number: usize) -> Option<Unrested> {
         Rest::Moves(velocity) => Some(velocity),
         Rest::Unseen => None,
     };
-    Some(Unrested { axis: u8::try_from(number).unwrap_or(u8::MAX), state: axis.state(), velocity })
+    Some(Unrested { axis: axis_number(number), state: axis.state(), velocity })
 }

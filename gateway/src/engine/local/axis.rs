@@ -15,7 +15,7 @@ use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, StatusBits};
 use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::quantity::Acceleration;
-use profile_generic::state::{Action, DriveState, Report, Request};
+use profile_generic::state::{DriveState, Report, Request};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
 use super::JOG_TIME;
@@ -130,7 +130,7 @@ impl LocalAxis {
     ) -> Result<Option<Task>, Failure> {
         match order {
             // The stop of a movement of the drive ends with its halt.
-            Order::Enable | Order::Reset if self.halts(axis) => {
+            Order::Enable | Order::Reset if axis.halts() && matches!(self.source, Source::Drive) => {
                 return Err(Failure::Stopping);
             }
             Order::Enable => {}
@@ -216,12 +216,6 @@ impl LocalAxis {
         self.source = Source::Drive;
         self.send(now, axis, command);
         Ok(())
-    }
-
-    /// Whether a movement of the drive is being stopped.
-    fn halts(&self, axis: &AxisChannel) -> bool {
-        let halts = axis.state() == DriveState::Operating && axis.action() == Action::Halt;
-        halts && matches!(self.source, Source::Drive)
     }
 
     /// Brings the axis to standstill, and cancels a start in progress.
@@ -409,7 +403,7 @@ fn check_enabled(axis: &AxisChannel) -> Result<(), Failure> {
         Some(fault) => Err(Failure::Fault(fault.cause)),
         None if !axis.operates() => Err(Failure::NotEnabled(axis.state())),
         // It would not follow before the drive has ended its halt.
-        None if axis.action() == Action::Halt => Err(Failure::Stopping),
+        None if axis.halts() => Err(Failure::Stopping),
         None => Ok(()),
     }
 }

@@ -278,14 +278,11 @@ impl SercosBus {
 
     /// What the bus is without. A drive that was left out does not come by hot plug either: it is there.
     fn missing(&self) -> Missing {
-        let mut gone = self.drives.iter().filter(|drive| drive.slave.is_none()).peekable();
-        if gone.peek().is_none() {
-            return Missing::None;
-        }
+        let gone = || self.drives.iter().filter(|drive| drive.slave.is_none());
         let is_found = |drive: &Drive| self.master.slave_by_address(drive.setup.address).is_some();
-        if gone.clone().any(is_found) {
+        if gone().any(is_found) {
             Missing::LeftOut
-        } else if gone.all(|drive| drive.hot_plug) {
+        } else if gone().all(|drive| drive.hot_plug) {
             Missing::None
         } else {
             Missing::Absent
