@@ -84,10 +84,11 @@ impl Lines {
     }
 }
 
-/// A line for a person: time, level, what it is about, text.
+/// A line for a person: time, level, what it is about, text. Some texts begin with their bus.
 fn line(event: &LogEvent) -> String {
     let LogEvent { time, level, axis, device, bus, text, .. } = event;
     let about = axis.as_ref().or(device.as_ref()).or(bus.as_ref()).map(|name| format!("{name}: "));
+    let about = about.filter(|about| !text.starts_with(about));
     let level = level.to_ascii_uppercase();
     printable(&format!("{time} {level:>5} {}{text}", about.unwrap_or_default()))
 }
@@ -110,7 +111,11 @@ mod tests {
         assert_eq!(line(&event), shown);
         event.axis = None;
         assert!(line(&event).contains(" WARN SERCOS: the drive"));
+        event.text.insert_str(0, "SERCOS: ");
+        assert!(line(&event).contains(" WARN SERCOS: the drive"), "once");
         event.bus = None;
+        assert!(line(&event).contains(" WARN SERCOS: the drive"), "as it was written");
+        event.text = "the drive".to_owned();
         assert!(line(&event).contains(" WARN the drive"));
     }
 }

@@ -158,8 +158,11 @@ impl Master {
         let window = self.config.sync.map_or(0, |sync| sync.window_ns);
         let late = window > 0 && now.since(self.last_sync).0 > i64::from(window);
         let station = &mut self.stations[index];
-        if station.state != BootState::Operational {
-            return Err(Refusal::NotOperational);
+        match station.state {
+            BootState::Operational => {}
+            // Between its start and the heartbeat that says so it sends what the master has asked for and does not use yet.
+            BootState::Starting => return Ok(()),
+            _ => return Err(Refusal::NotOperational),
         }
         let node = station.node;
         let end = &mut station.tpdos[place];

@@ -32,6 +32,28 @@ fn rpdos_follow_sync_and_go_only_when_committed() {
     assert!(!rig.master.commit(id(1), 2));
 }
 
+/// A started device sends before its heartbeat says that it is in operation: that is neither used nor a fault of anybody.
+#[test]
+fn a_pdo_between_start_and_heartbeat_is_neither_used_nor_refused() {
+    let mut rig = rig(network(1));
+    rig.cyclic = false;
+    rig.master.start(rig.now);
+    let pdo = |rig: &mut Rig| rig.hear(Id::Standard(0x181), &[1, 2, 3, 4, 5, 6]);
+    rig.until("map", |rig| rig.state(1) == BootState::Map);
+    assert_eq!(pdo(&mut rig), Err(Refusal::NotOperational));
+    rig.device(1).no_heartbeat = true;
+    rig.until("start", |rig| rig.state(1) == BootState::Starting);
+    let before = rig.master.statistics().refused;
+    assert_eq!(pdo(&mut rig), Ok(()));
+    let consumer = rig.master.consumer(id(1), 1).unwrap();
+    assert_eq!((consumer.fresh, consumer.state), (false, ConsumerState::Waiting));
+    assert_eq!(rig.master.statistics().refused, before);
+    rig.device(1).no_heartbeat = false;
+    rig.until("operation", |rig| rig.saw(&Event::NetworkOperational));
+    assert_eq!(pdo(&mut rig), Ok(()));
+    assert!(rig.master.consumer(id(1), 1).unwrap().fresh);
+}
+
 #[test]
 fn what_devices_send_is_fresh_for_one_period() {
     let mut rig = running(1);
