@@ -474,6 +474,8 @@ impl AxisChannel {
     /// Stops the axis for a fault, by the reaction that is decided for it.
     pub fn take_fault(&mut self, now: MonotonicTime, system: SystemTime, fault: Fault) {
         self.faults.stop_for(fault);
+        // An order from before the fault does not switch the axis on after the reset.
+        self.orders.forget_pending();
         let transition = self.drive.machine.raise_fault(fault.reaction);
         self.follow(now, system, transition);
     }
@@ -487,10 +489,14 @@ impl AxisChannel {
     // ---- the state machine -------------------------------------------------------------------------------------
 
     pub(in crate::engine) fn request(&mut self, now: MonotonicTime, system: SystemTime, request: Request) {
-        if !self.may_start() && matches!(request, Request::Enable | Request::Test) {
+        let is_start = matches!(request, Request::Enable | Request::Test);
+        if is_start && !self.may_start() {
             return;
         }
         let transition = self.drive.machine.request(request);
+        if is_start && transition.action == Action::Reject {
+            self.orders.reject_enable();
+        }
         self.follow(now, system, transition);
     }
 
@@ -502,8 +508,8 @@ impl AxisChannel {
             self.feedback.state = transition.next;
         }
         match transition.action {
-            Action::None => {}
-            Action::Reject => self.orders.reject(),
+            // What a rejection means depends on the request: see `request`.
+            Action::None | Action::Reject => {}
             Action::ResetFault => {
                 // The reset is a pulse, of the control word or a procedure command; the axis stays without torque.
                 self.drive.action = Action::TorqueOff;

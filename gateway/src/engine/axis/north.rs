@@ -117,6 +117,11 @@ impl AxisChannel {
         }
     }
 
+    /// An enable that was rejected is not tried again.
+    pub fn forget_pending_enable(&mut self) {
+        self.orders.forget_pending();
+    }
+
     fn carry_out_wish(&mut self, now: MonotonicTime, system: SystemTime) {
         let Wish { intent, request } = self.orders.wish();
         if !self.may_start() && matches!(intent, Intent::Enable | Intent::Test) {
@@ -236,6 +241,7 @@ impl AxisChannel {
     /// Another north side has the axis: its commands and set-points count by numbers of its own.
     pub fn begin_north(&mut self) {
         self.orders.forget_number();
+        self.orders.forget_pending();
         self.end_set_points();
     }
 

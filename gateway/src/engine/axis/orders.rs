@@ -112,10 +112,15 @@ impl Orders {
         self.enable_pending = false;
     }
 
-    /// The request for it was rejected: an enable that came in the very cycle in which the drive was not ready is still
+    /// The request of an enable or a test was rejected: one that came in the very cycle in which the drive was not ready is still
     /// asked for.
-    pub fn reject(&mut self) {
+    pub fn reject_enable(&mut self) {
         self.enable_pending = matches!(self.wish.intent, Intent::Enable | Intent::Test);
+    }
+
+    /// Such an enable is not tried again: what has happened since needs a new order.
+    pub fn forget_pending(&mut self) {
+        self.enable_pending = false;
     }
 
     /// Whether such an enable is to be tried again, now that the drive is ready.
@@ -204,16 +209,20 @@ mod tests {
     }
 
     #[test]
-    fn only_a_rejected_enable_or_test_is_tried_again_and_another_wish_ends_it() {
+    fn only_a_rejected_enable_or_test_is_tried_again_until_another_wish_or_event() {
         for (intent, again) in
             [(Intent::Enable, true), (Intent::Test, true), (Intent::Disable, false), (Intent::Abort, false)]
         {
             let mut orders = Orders::default();
             orders.want(Wish { intent, request: None });
-            orders.reject();
+            orders.reject_enable();
             assert_eq!((orders.take_pending(), orders.take_pending()), (again, false), "{intent:?}");
-            orders.reject();
+            orders.reject_enable();
             orders.want(Wish::default());
+            assert!(!orders.take_pending(), "{intent:?}");
+            orders.want(Wish { intent, request: None });
+            orders.reject_enable();
+            orders.forget_pending();
             assert!(!orders.take_pending(), "{intent:?}");
         }
     }

@@ -178,3 +178,56 @@ fn a_reset_ends_the_fault_and_a_condition_that_comes_again_is_one_again() {
     watched(&mut axis, OVERSPEED);
     assert_eq!((axis.state(), cause(&axis)), (DriveState::FaultReaction, Some(OVERSPEED)));
 }
+
+/// An axis that was enabled by a wish and is in operation.
+fn enabled_by_wish() -> AxisChannel {
+    let mut axis = AxisChannel::new(Limits::default(), Reaction::HoldPosition, true);
+    axis.report(NOW, SYSTEM, Report::Ready);
+    axis.take_wish(NOW, SYSTEM, Wish { intent: Intent::Enable, request: Some(Request::Enable) });
+    axis.report(NOW, SYSTEM, Report::Operating);
+    assert_eq!(axis.state(), DriveState::Operating);
+    axis
+}
+
+#[test]
+fn rejected_fault_reset_leaves_no_enable_behind() {
+    let mut axis = enabled_by_wish();
+    watched(&mut axis, OVERSPEED);
+    axis.watch_conditions(NOW, SYSTEM, &[(OVERSPEED, false)]);
+    axis.want_reset(NOW, SYSTEM, 1);
+    // The drive keeps its torque beyond the time limit of the stop, and the reset is rejected.
+    let late = NOW + STOP_TIME_OUT + DurationNs(1);
+    axis.report(late, SYSTEM, Report::Operating);
+    assert_eq!(axis.state(), DriveState::Faulted);
+    axis.report(late, SYSTEM, Report::Ready);
+    axis.want_reset(late, SYSTEM, 2);
+    axis.report(late, SYSTEM, Report::Ready);
+    axis.retry_wish(late, SYSTEM);
+    assert_eq!((axis.state(), cause(&axis)), (DriveState::Ready, None));
+}
+
+#[test]
+fn rejected_enable_is_tried_again_and_ends_with_a_fault_or_another_north_side() {
+    let ends: [(&str, fn(&mut AxisChannel), DriveState); 3] = [
+        ("nothing", |_| {}, DriveState::Starting),
+        ("another north side", AxisChannel::begin_north, DriveState::Ready),
+        (
+            "a fault",
+            |axis| {
+                axis.raise(NOW, SYSTEM, Fault::new(FaultCause::COMMAND_LOST, SYSTEM));
+                axis.want_reset(NOW, SYSTEM, 1);
+            },
+            DriveState::Ready,
+        ),
+    ];
+    for (what, happens, state) in ends {
+        let mut axis = AxisChannel::new(Limits::default(), Reaction::HoldPosition, true);
+        axis.report(NOW, SYSTEM, Report::AwaitingPower);
+        axis.take_wish(NOW, SYSTEM, Wish { intent: Intent::Enable, request: Some(Request::Enable) });
+        assert_eq!(axis.state(), DriveState::AwaitingPower, "{what}");
+        happens(&mut axis);
+        axis.report(NOW, SYSTEM, Report::Ready);
+        axis.retry_wish(NOW, SYSTEM);
+        assert_eq!(axis.state(), state, "{what}");
+    }
+}

@@ -220,6 +220,7 @@ impl LocalAxis {
 
     /// Brings the axis to standstill, and cancels a start in progress.
     fn stop(&mut self, now: Now, axis: &mut AxisChannel) {
+        axis.forget_pending_enable();
         match &mut self.source {
             Source::Generator { generator, jog_ends } => {
                 generator.profile.brake();
