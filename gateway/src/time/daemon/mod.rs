@@ -58,12 +58,12 @@ impl Daemon {
             Some(phc) => phc.read(),
             None => realtime_reading(),
         };
+        self.watch.read(reading, self.phc.is_some());
         if self.turn == 0 {
             let picture = self.client.ask();
             self.watch.asked(picture, now);
         }
         self.turn = (self.turn + 1) % READINGS;
-        self.watch.read(reading, self.phc.is_some());
         self.watch.status(now)
     }
 }
@@ -76,6 +76,8 @@ struct Watch {
     status: TimeStatus,
     ingress: Option<i64>,
     silent: u8,
+    /// Readings of the clock that failed in a row.
+    unread: u8,
 }
 
 impl Watch {
@@ -86,16 +88,20 @@ impl Watch {
             status: TimeStatus::ptp(config),
             ingress: None,
             silent: 0,
+            unread: 0,
         }
     }
 
     fn asked(&mut self, picture: Option<Picture>, now: MonotonicTime) {
-        let Some(picture) = picture else {
+        // What the daemon says of a clock that cannot be read is not said of system time, which goes on with the last rate.
+        let Some(picture) = picture.filter(|_| self.unread < READINGS) else {
             self.silent = self.silent.saturating_add(1);
             if self.silent == SILENT {
                 self.status.master = None;
                 self.judge.handle(Event::NoMaster, now);
             }
+            // The bound of the error grows on, and ends the holdover.
+            self.judge.handle(Event::Time, now);
             return;
         };
         self.silent = 0;
@@ -134,7 +140,11 @@ impl Watch {
 
     /// A reading of the clock that the daemon keeps.
     fn read(&mut self, reading: Option<PairedReading>, is_phc: bool) {
-        let Some(reading) = reading else { return };
+        let Some(reading) = reading else {
+            self.unread = self.unread.saturating_add(1);
+            return;
+        };
+        self.unread = 0;
         let master = self.status.master;
         let seconds =
             master.filter(|master| master.ptp_time_scale && !is_phc).and_then(|master| master.utc_offset);
@@ -212,6 +222,43 @@ mod tests {
         let mut watch = slave();
         (10..13).for_each(|second| watch.asked(None, at(second)));
         assert_eq!((watch.status(at(13)).phase, watch.status(at(13)).master), (SyncPhase::Holdover, None));
+    }
+
+    #[test]
+    fn holdover_without_a_daemon_ends_when_the_bound_passes_the_threshold() {
+        let mut watch = slave();
+        // 300 ns, and 500 ns each second since the last offset at second 9.
+        for (second, phase) in
+            [(28, SyncPhase::Holdover), (29, SyncPhase::Listening), (600, SyncPhase::Listening)]
+        {
+            (10..=second).for_each(|second| watch.asked(None, at(second)));
+            assert_eq!(watch.status(at(second)).phase, phase, "{second}");
+        }
+    }
+
+    #[test]
+    fn daemon_whose_clock_cannot_be_read_is_held_over_and_then_not_synchronized() {
+        let mut watch = slave();
+        let mut phases = Vec::new();
+        for second in 10..40_u64 {
+            (0..READINGS).for_each(|_| watch.read(None, true));
+            let ingress = i64::try_from(second).unwrap();
+            watch.asked(Some(Picture { ingress, ..SLAVE_OF }), at(second));
+            phases.push(watch.status(at(second)).phase);
+        }
+        assert_eq!(
+            (phases[0], phases[9], phases[29]),
+            (SyncPhase::Synchronized, SyncPhase::Holdover, SyncPhase::Listening)
+        );
+        // One reading, and what the daemon says counts again.
+        for second in 40..50_u64 {
+            let time = 1_700_000_000_000_000_000 + at(second).0;
+            watch.read(Some(PairedReading { apart: 100, at: at(second), time }), true);
+            (1..READINGS).for_each(|_| watch.read(None, true));
+            let ingress = i64::try_from(second).unwrap();
+            watch.asked(Some(Picture { ingress, ..SLAVE_OF }), at(second));
+        }
+        assert_eq!(watch.status(at(50)).phase, SyncPhase::Synchronized);
     }
 
     #[test]
