@@ -401,14 +401,18 @@ impl Engine {
             ..
         } = self;
         let time = &clock.base;
+        // A restart, which a Reset of any device asks for, stops all axes.
+        let in_use = devices.iter().any(|channel| channel.device().connection().is_some())
+            || assemblies.iter().any(AssemblyChannel::is_connected)
+            || axes.iter().any(AxisChannel::may_have_torque);
         for channel in devices.iter_mut() {
             if let Some(port) = north.get_mut(usize::from(channel.number())) {
-                channel.receive(now, time, &mut **port);
+                channel.receive(now, time, in_use, &mut **port);
             }
         }
         for channel in assemblies.iter_mut() {
             if let Some(port) = north.get_mut(usize::from(channel.number())) {
-                channel.receive(now, &mut **port);
+                channel.receive(now, in_use, &mut **port);
             }
         }
         devices.iter().for_each(|channel| channel.publish_connection(axes));
@@ -619,3 +623,6 @@ fn push(notices: &mut rtrb::Producer<Notice>, notice: Notice) {
     // A full queue drops the notice; the state itself stands in the published status.
     let _ = notices.push(notice);
 }
+
+#[cfg(test)]
+mod tests;

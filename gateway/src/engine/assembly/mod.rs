@@ -19,7 +19,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 
 use profile_cip::assembly::layout::ASSEMBLY_LEN_MAX;
 use profile_cip::assembly::{Assemblies, Link, Refusal, Scale};
-use profile_cip::device::motion_link::{ExplicitReply, ExplicitRequest, MotionReply, MotionRequest, Token};
+use profile_cip::device::motion_link::{ExplicitReply, ExplicitRequest, MotionReply, MotionRequest};
 use profile_cip::device::objects::ac_dc_drive::{self, VALUE_LEN};
 use profile_cip::device::objects::assembly::is_data;
 use profile_cip::device::visualization::{self, Indication, NetworkCondition};
@@ -68,8 +68,6 @@ pub struct AssemblyChannel {
     input: Box<[u8]>,
     /// Whether system time can be trusted.
     synchronized: bool,
-    /// Somebody wants to know whether the device may be started anew.
-    reset: Option<Token>,
     /// A connection was lost, and no other has followed.
     lost: bool,
     parameters: Parameters,
@@ -88,7 +86,6 @@ impl AssemblyChannel {
             axes: axes.iter().map(PlcAxis::new).collect(),
             input,
             synchronized: false,
-            reset: None,
             lost: false,
             parameters: Parameters::default(),
         }
@@ -136,7 +133,7 @@ impl AssemblyChannel {
     /// What the Network Status LED of the device shows.
     #[must_use]
     pub fn network_status(&self) -> Indication {
-        let connected = self.connections.any() || self.link.explicit_connections() > 0;
+        let connected = self.is_connected() || self.link.explicit_connections() > 0;
         visualization::network_status(&NetworkCondition::listening(connected, self.lost))
     }
 
@@ -146,8 +143,15 @@ impl AssemblyChannel {
         self.axes.iter().for_each(|axis| axes[axis.number].set_controller(connected));
     }
 
-    /// Takes requests of the explicit side and what came on the connections.
-    pub fn receive(&mut self, now: MonotonicTime, port: &mut dyn NorthPort) {
+    /// Whether any connection to the assemblies is open.
+    #[must_use]
+    pub fn is_connected(&self) -> bool {
+        self.connections.any()
+    }
+
+    /// Takes requests of the explicit side and what came on the connections. While the gateway is `in_use`, this device may not be
+    /// started anew, whatever its own axes do.
+    pub fn receive(&mut self, now: MonotonicTime, in_use: bool, port: &mut dyn NorthPort) {
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(request) = self.link.request() else { break };
             let reply = match request {
@@ -173,8 +177,8 @@ impl AssemblyChannel {
                     }
                 },
                 MotionRequest::PrepareReset(token) => {
-                    self.reset = Some(token);
-                    continue;
+                    let granted = !in_use && !self.is_connected();
+                    MotionReply::ResetPrepared { token, granted }
                 }
             };
             // A full queue means that the explicit side has given up waiting.
@@ -233,22 +237,12 @@ impl AssemblyChannel {
     pub fn transmit(&mut self, now: MonotonicTime, port: &mut dyn NorthPort) {
         self.connections.transmit(now, &self.input, port);
     }
-
-    /// Answers whether the device may be started anew: nobody is connected, and no axis has torque.
-    fn answer_reset(&mut self, axes: &[AxisChannel]) {
-        if let Some(token) = self.reset.take() {
-            let torque = self.axes.iter().any(|axis| axes[axis.number].may_have_torque());
-            let granted = !self.connections.any() && !torque;
-            let _ = self.link.reply(MotionReply::ResetPrepared { token, granted });
-        }
-    }
 }
 
 impl North for AssemblyChannel {
     /// Hands each axis what the controller wants of it, and puts the input assembly together.
     fn exchange(&mut self, exchange: &mut Exchange<'_>) {
         let Exchange { now, time, ending, ref mut axes, ref mut notice, .. } = *exchange;
-        self.answer_reset(axes);
         let fresh = self.connections.take_fresh();
         let data = self.connections.output();
         let owner = self.connections.owner();

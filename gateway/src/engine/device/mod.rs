@@ -17,6 +17,7 @@ use std::net::SocketAddrV4;
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::device::fault_log::FaultLog;
 use profile_cip::device::motion_device::{DeviceConfig, DeviceError, MotionDevice};
+use profile_cip::device::motion_link::{MotionReply, MotionRequest};
 use profile_cip::device::visualization::{self, Indication, NetworkCondition};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram, SEQUENCE_COUNT_LEN};
 use profile_cip::wire::motion::codes::{NodeAlarm, NodeFault};
@@ -208,12 +209,19 @@ impl DeviceChannel {
         self.members.iter().for_each(|member| axes[member.axis].set_controller(connected));
     }
 
-    /// Takes requests of the explicit side and what came on the I/O connection.
-    pub fn receive(&mut self, now: MonotonicTime, time: &TimeBase, port: &mut dyn NorthPort) {
+    /// Takes requests of the explicit side and what came on the I/O connection. While the gateway is `in_use`, this device may not be
+    /// started anew, whatever its own axes do.
+    pub fn receive(&mut self, now: MonotonicTime, time: &TimeBase, in_use: bool, port: &mut dyn NorthPort) {
         let system = time.system_at(now);
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(request) = self.link.request() else { break };
-            self.device.request(now, Some(system), request);
+            match request {
+                MotionRequest::PrepareReset(token) if in_use => {
+                    // A full queue means that the explicit side has given up waiting.
+                    let _ = self.link.reply(MotionReply::ResetPrepared { token, granted: false });
+                }
+                request => self.device.request(now, Some(system), request),
+            }
         }
         let mut buffer = std::mem::take(&mut self.buffer);
         let (mut updates, mut refused) = (0, 0);
