@@ -8,6 +8,7 @@
 //! This runs in the cycle: it does not allocate or wait. Requests come through a bounded queue.
 
 use profile_cia402::sdo::request::SdoFailure;
+use profile_cia402::wire::abort::AbortCode;
 use profile_cip::wire::status::GeneralStatus;
 use profile_sercos::master::svc::request::SvcFailure;
 use profile_sercos::wire::attribute::Attribute;
@@ -26,6 +27,9 @@ const QUEUE_LEN: usize = 16;
 
 /// Longest data of an access, bytes: a list or text of SERCOS has no more.
 pub const DATA_MAX: usize = 65_535;
+
+/// Longest data that every bus writes in a single step, bytes: the drive takes them all or none.
+const SINGLE_STEP_MAX: usize = 4;
 
 /// What is accessed in a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -169,6 +173,29 @@ pub enum DirectFailure {
 }
 
 impl DirectFailure {
+    /// Whether the drive may have taken a write of `len` bytes that failed so, in whole or in part: not one that did not reach it, and
+    /// not one of a single step that it has refused.
+    #[must_use]
+    pub fn may_have_written(&self, len: usize) -> bool {
+        match self {
+            Self::NoAxis
+            | Self::Controller
+            | Self::Held
+            | Self::Torque
+            | Self::Ending
+            | Self::OtherBus
+            | Self::NoDrive
+            | Self::Unsent
+            | Self::Svc(SvcFailure::Length { .. }) => false,
+            // Nobody knows how far a memory that fails has come.
+            Self::Sdo(SdoFailure::Refused(AbortCode::HARDWARE)) => true,
+            Self::Svc(SvcFailure::Refused { .. }) | Self::Sdo(SdoFailure::Refused(_)) | Self::Cip(_) => {
+                len > SINGLE_STEP_MAX
+            }
+            Self::Svc(_) | Self::Sdo(_) | Self::Unanswered | Self::TooLong(_) => true,
+        }
+    }
+
     /// The code in the protocol of local control. Codes never change.
     #[must_use]
     pub fn code(&self) -> &'static str {
@@ -244,6 +271,8 @@ struct Active {
     client: ClientId,
     id: u32,
     axis: usize,
+    /// It was for this access, of so many bytes, that the axes must not be enabled any more.
+    rescales: Option<usize>,
 }
 
 impl DirectNorth {
@@ -267,15 +296,24 @@ impl DirectNorth {
         if self.answers.is_full() {
             return None;
         }
-        if let Some(Active { client, id, axis }) = self.active {
+        if let Some(Active { client, id, axis, rescales }) = self.active {
             let DirectResult { result, data } = buses.take_direct(axis)?;
             self.active = None;
+            if let (Err(failure), Some(len)) = (&result, rescales)
+                && !failure.may_have_written(len)
+            {
+                let sharing = axes.iter_mut().enumerate();
+                sharing
+                    .filter(|(other, _)| buses.share_device(axis, *other))
+                    .for_each(|(_, axis)| axis.rescale(now, system, false));
+            }
             let _ = self.answers.push(DirectAnswer { client, id, result, data });
             return None;
         }
         let request = self.requests.pop().ok()?;
         let DirectRequest { client, id, axis, target, direction, data } = request;
         let axis = usize::from(axis);
+        let len = data.len();
         let begun = match refusal(axis, direction, axes, ending, buses) {
             Some(failure) => Err((failure, data)),
             None => {
@@ -287,13 +325,16 @@ impl DirectNorth {
         let written = target.item().filter(|_| begun.is_ok() && direction != Direction::Read);
         match begun {
             Ok(()) => {
-                self.active = Some(Active { client, id, axis });
-                if direction == (Direction::Write { rescales: true }) {
+                let mut is_first = direction == (Direction::Write { rescales: true });
+                if is_first {
                     let sharing = axes.iter_mut().enumerate();
-                    sharing
-                        .filter(|(other, _)| buses.share_device(axis, *other))
-                        .for_each(|(_, axis)| axis.rescale(now, system));
+                    for (_, axis) in sharing.filter(|(other, _)| buses.share_device(axis, *other)) {
+                        // What an earlier access has changed is not undone by a refusal of this one.
+                        is_first &= !axis.is_rescaled();
+                        axis.rescale(now, system, true);
+                    }
                 }
+                self.active = Some(Active { client, id, axis, rescales: is_first.then_some(len) });
             }
             Err((failure, data)) => {
                 let _ = self.answers.push(DirectAnswer { client, id, result: Err(failure), data });
@@ -329,4 +370,32 @@ fn refusal(
         Owner::Local => Some(DirectFailure::Held),
         Owner::Nobody => axis.may_have_torque().then_some(DirectFailure::Torque),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use profile_sercos::wire::svc_error::SvcError;
+
+    use super::*;
+
+    #[test]
+    fn only_a_refusal_of_a_single_step_leaves_what_the_drive_has() {
+        let svc =
+            |code| DirectFailure::Svc(SvcFailure::Refused { element: Element::Data, code: SvcError(code) });
+        let sdo = |code| DirectFailure::Sdo(SdoFailure::Refused(code));
+        for (failure, len, may) in [
+            (DirectFailure::Torque, 2, false),
+            (DirectFailure::Unsent, 8, false),
+            (svc(0x7005), 4, false),
+            (svc(0x7005), 5, true),
+            (sdo(AbortCode::READ_ONLY), 4, false),
+            (sdo(AbortCode::READ_ONLY), 8, true),
+            (sdo(AbortCode::HARDWARE), 4, true),
+            (DirectFailure::Cip(GeneralStatus::ATTRIBUTE_NOT_SETTABLE), 2, false),
+            (DirectFailure::Sdo(SdoFailure::Timeout { milliseconds: 500 }), 1, true),
+            (DirectFailure::Unanswered, 1, true),
+        ] {
+            assert_eq!(failure.may_have_written(len), may, "{failure:?} {len}");
+        }
+    }
 }

@@ -11,7 +11,7 @@ use crate::cli::gateway_client::GatewayClient;
 pub use crate::cli::gateway_client::Reply;
 use crate::cli::{CliError, signal};
 use crate::local::drive::CommandReport;
-use crate::local::drive::job::{Act, Listing, ParameterReport};
+use crate::local::drive::job::{Act, Listing, ParameterReport, RECOMMISSION};
 use crate::local::drive::reply::report;
 pub use crate::local::drive::reply::{List, Listed, Refused};
 use crate::parameter::id::Id;
@@ -159,7 +159,13 @@ impl Drive {
     ) -> Result<Found<T>, CliError> {
         let reply = self.link.ask(&format!("{request} {} {rest}", self.axis))?.last;
         let Some(words) = reply.strip_prefix(&format!("ok {request} {} ", self.axis)) else {
-            return Ok(Found::Refused(Refused::parse(&reply)));
+            let mut refused = Refused::parse(&reply);
+            if self.is_alone()
+                && let Some(text) = refused.text.strip_suffix(RECOMMISSION)
+            {
+                refused.text = text.to_owned();
+            }
+            return Ok(Found::Refused(refused));
         };
         read(words)
             .map(|report| Found::Report(Box::new(report)))

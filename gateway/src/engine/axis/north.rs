@@ -90,11 +90,17 @@ impl AxisChannel {
         self.set_points.keep_updates(updates, &self.feedback);
     }
 
-    /// A parameter was written that decides what the values of the drive mean: the axis cannot be enabled before its drive was
-    /// commissioned again. Only without torque.
-    pub fn rescale(&mut self, now: MonotonicTime, system: SystemTime) {
-        self.rescaled = true;
+    /// Sets whether a parameter was written that decides what the values of the drive mean: the axis cannot be enabled before its drive
+    /// was commissioned again. Only without torque.
+    pub fn rescale(&mut self, now: MonotonicTime, system: SystemTime, rescaled: bool) {
+        self.rescaled = rescaled;
         self.set_inhibits(now, system, self.drive.machine.conditions().inhibits);
+    }
+
+    /// Whether such a parameter was written since the drive was commissioned.
+    #[must_use]
+    pub fn is_rescaled(&self) -> bool {
+        self.rescaled
     }
 
     /// Raises a fault: the controller's configuration of this axis cannot be used.

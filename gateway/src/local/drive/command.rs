@@ -16,7 +16,7 @@ use profile_sercos::wire::procedure::ProcedureControl;
 use profile_sercos::wire::svc::Element;
 use serde::{Deserialize, Serialize};
 
-use super::job::{Act, Ask, Context, Step, error, is_over, room};
+use super::job::{Act, Ask, Context, RECOMMISSION, Step, error, is_over, room};
 use super::parameter::{ELEMENT_MAX, TEXT};
 use crate::engine::direct::{DirectAnswer, DirectFailure, Direction, Target};
 use crate::local::protocol::printable;
@@ -25,6 +25,9 @@ use crate::parameter::command::{belongs_to_gateway, recommissions, signature};
 use crate::parameter::id::Id;
 use crate::parameter::known::Bus;
 use crate::parameter::value::Kind;
+
+/// Length of a signature, which is longer than the word that starts a procedure command.
+const SIGNATURE_LEN: usize = 4;
 
 /// How far a procedure command is, as its drive has answered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -261,7 +264,12 @@ impl CommandJob {
         Step::Access(Target::Element(idn, Element::Data), Direction::Write { rescales }, word)
     }
 
-    fn write_signature(&mut self, object: Object, signature: [u8; 4], context: &Context<'_>) -> Step {
+    fn write_signature(
+        &mut self,
+        object: Object,
+        signature: [u8; SIGNATURE_LEN],
+        context: &Context<'_>,
+    ) -> Step {
         self.asked = Asked::Signature;
         self.report.name = match context.bus {
             Bus::Can { .. } => context.bus.object(object).map(|known| known.name.clone()),
@@ -293,7 +301,7 @@ impl CommandJob {
     fn failed(&self, failure: &DirectFailure, context: &Context<'_>) -> Step {
         let id = self.id;
         let is_open = failure.code() == "unanswered" && *failure != DirectFailure::NoDrive;
-        let text = match (self.asked, self.act) {
+        let mut text = match (self.asked, self.act) {
             (Asked::Start | Asked::Signature, _) if is_open => {
                 format!("{id}: it is not known whether the drive executes it: {failure}")
             }
@@ -305,6 +313,14 @@ impl CommandJob {
             }
             _ => format!("{id}: {failure}"),
         };
+        let is_started = match self.asked {
+            Asked::Start | Asked::Signature => failure.may_have_written(SIGNATURE_LEN),
+            Asked::Status | Asked::Number | Asked::Message => self.act == Act::Start,
+            Asked::Attribute | Asked::Name | Asked::Before | Asked::Clear | Asked::Cancel => false,
+        };
+        if is_started && recommissions(id) {
+            text += RECOMMISSION;
+        }
         self.fail(failure.code(), &text, context)
     }
 

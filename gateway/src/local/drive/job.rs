@@ -212,6 +212,9 @@ impl Job {
     }
 }
 
+/// What the text of a failure ends with when the drive may mean something else by its values afterwards.
+pub const RECOMMISSION: &str = "; the axis cannot be enabled before its drive was commissioned again";
+
 /// A buffer to read into.
 pub(super) fn room(len: usize) -> Vec<u8> {
     Vec::with_capacity(len)

@@ -12,7 +12,7 @@ use profile_sercos::wire::attribute::Attribute;
 use profile_sercos::wire::idn::Idn;
 use profile_sercos::wire::svc::Element;
 
-use super::job::{Ask, Context, Listing, ParameterReport, Step, error, is_over, read, room};
+use super::job::{Ask, Context, Listing, ParameterReport, RECOMMISSION, Step, error, is_over, read, room};
 use crate::config::KnownObject;
 use crate::engine::direct::{DirectAnswer, DirectFailure, Direction, Target};
 use crate::local::protocol::parameter_lines;
@@ -128,8 +128,10 @@ impl ParameterJob {
                 if data != self.wanted {
                     let wanted = self.kind(context).decode(&self.wanted);
                     let text = format!(
-                        "the drive took {} = {wanted} and has {} afterwards",
-                        self.report.id, self.report.value
+                        "the drive took {} = {wanted} and has {} afterwards{}",
+                        self.report.id,
+                        self.report.value,
+                        self.recommission()
                     );
                     return Step::Reply(error(&self.ask, context, "not-kept", &text));
                 }
@@ -255,19 +257,31 @@ impl ParameterJob {
         Step::Reply(format!("ok {} {} {json}\n", self.ask.word(), context.axis))
     }
 
+    /// What a failure has to add once a value was written.
+    fn recommission(&self) -> &'static str {
+        let is_written = !matches!(self.asked, Asked::Value | Asked::Before | Asked::List);
+        match self.ask {
+            Ask::Write { id, .. } if is_written && rescales(id) => RECOMMISSION,
+            _ => "",
+        }
+    }
+
     /// The reply of a failure, and what was done before.
     fn failed(&self, failure: &DirectFailure, context: &Context<'_>) -> String {
         let what = match self.ask.id() {
             Some(id) => id.to_string(),
             None => list_idn(self.listing()).to_string(),
         };
-        let text = match self.asked {
+        let mut text = match self.asked {
             Asked::Back => format!("{what}: written, and not read back: {failure}"),
             Asked::Write if failure.code() == "unanswered" && *failure != DirectFailure::NoDrive => {
                 format!("{what}: it is not known whether the drive has taken the value: {failure}")
             }
             _ => format!("{what}: {failure}"),
         };
+        if self.asked != Asked::Write || failure.may_have_written(self.wanted.len()) {
+            text += self.recommission();
+        }
         error(&self.ask, context, failure.code(), &text)
     }
 }
@@ -518,6 +532,41 @@ mod tests {
         assert_eq!(targets.last(), Some(&Target::Element(Idn::standard(104), Element::Unit)));
         assert!(reply.contains("\"unit\":\"A\""), "{reply}");
         assert!(reply.contains("\"value\":\"2.00\",\"before\":\"1.50\",\"data\":\"c800\""), "{reply}");
+    }
+
+    #[test]
+    fn failure_after_the_write_of_a_scaling_says_that_the_drive_has_to_be_commissioned_again() {
+        let factor = Attribute::new(ItemLength::Two, Format::Unsigned);
+        let before = || (Ok(Some(factor)), vec![1, 0]);
+        let gone = || (Err(DirectFailure::Unanswered), vec![]);
+        let again = "; the axis cannot be enabled before its drive was commissioned again";
+        for (answers, text, changes) in [
+            (vec![gone()], "unanswered: S-0-0077: the drive does not answer", false),
+            (
+                vec![before(), (refused(Element::Data, 0x7005), vec![5, 0])],
+                "refused: S-0-0077: the drive refuses the operation data with 0x7005: operation data is write protected at this time",
+                false,
+            ),
+            (
+                vec![before(), gone()],
+                "unanswered: S-0-0077: it is not known whether the drive has taken the value: the drive does not answer",
+                true,
+            ),
+            (
+                vec![before(), (Ok(None), vec![]), gone()],
+                "unanswered: S-0-0077: written, and not read back: the drive does not answer",
+                true,
+            ),
+            (
+                vec![before(), (Ok(None), vec![]), before()],
+                "not-kept: the drive took S-0-0077 = 5 and has 1 afterwards",
+                true,
+            ),
+        ] {
+            let ask = Ask::Write { id: Id::parse("S-0-0077").unwrap(), text: "5".to_owned() };
+            let again = if changes { again } else { "" };
+            assert_eq!(steps(ask, answers).1, format!("error write x {text}{again}\n"));
+        }
     }
 
     #[test]
