@@ -120,10 +120,11 @@ impl Files {
         std::fs::create_dir_all(&self.folder)?;
         let path = self.folder.join(name(incident));
         replace_with(&path, file)?;
-        // Names begin with the time.
+        // Names begin with the time. That of the recording itself says nothing of its age when the clock of the host is behind.
         let mut names = self.names();
+        names.retain(|name| *name != path);
         names.sort();
-        for old in &names[..names.len().saturating_sub(FILES_MAX)] {
+        for old in &names[..names.len().saturating_sub(FILES_MAX - 1)] {
             let _ = std::fs::remove_file(old);
         }
         Ok(path)
@@ -232,6 +233,12 @@ mod tests {
         assert_eq!(names.len(), 11, "{names:?}");
         assert_eq!(names[0], "20260131T120003.000000Z-turn-table-1.pcapng");
         assert_eq!(names[10], "mine.pcapng");
+        // The clock of the host is behind: by its name the newest recording is the oldest one.
+        let incident = Incident { at: KernelTime(1_000 * SECOND), about: "x".to_owned(), cause: None };
+        let newest = files.write(&incident, b"newest").unwrap();
+        assert_eq!(std::fs::read(&newest).ok().as_deref(), Some(&b"newest"[..]), "{}", newest.display());
+        assert_eq!(files.names().len(), FILES_MAX);
+        assert!(!folder.join("20260131T120003.000000Z-turn-table-1.pcapng").exists());
         std::fs::remove_dir_all(&folder).unwrap();
     }
 }
