@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 use std::io::IsTerminal as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -42,16 +42,40 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     let asked = Asked { stop, hurry, reload: super::signal::reload_on_hang_up()? };
     info!(name = good.config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
     let manager = RefCell::new(ServiceManager::of_environment(Instant::now()));
-    loop {
+    for number in 1_u32.. {
         let settings = Arc::new(Store::open(good.config.settings_file.as_deref())?);
         let directory = good.config.history_dir.as_deref();
         let histories = directory.map_or_else(|| in_memory.clone(), |path| in_memory.kept_in(path));
-        match run_once(&good, arguments, &settings, &histories, &asked, &manager)? {
+        let capture = arguments.capture.as_deref().map(|path| capture_of(path, number));
+        let outputs = Outputs { capture: capture.as_deref(), settings: &settings, histories: &histories };
+        match run_once(&good, arguments, &outputs, &asked, &manager)? {
             After::End { rested: true } => return Ok(ExitCode::SUCCESS),
             After::End { rested: false } => return Ok(ExitCode::FAILURE),
             After::Again(next) => good = next.map_or(good, |next| *next),
         }
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The recording of a run of the gateway: from the second on with its number, so that a restart erases none.
+fn capture_of(path: &Path, number: u32) -> PathBuf {
+    if number == 1 {
+        return path.to_owned();
+    }
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!(".{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+/// Where a run of the gateway writes.
+struct Outputs<'a> {
+    capture: Option<&'a Path>,
+    settings: &'a Arc<Store>,
+    histories: &'a Histories,
 }
 
 /// A configuration and its tables, without errors.
@@ -115,18 +139,17 @@ fn tell(findings: &Findings) {
 fn run_once(
     good: &Good,
     arguments: &RunArguments,
-    settings: &Arc<Store>,
-    histories: &Histories,
+    outputs: &Outputs<'_>,
     asked: &Asked,
     manager: &RefCell<ServiceManager>,
 ) -> Result<After, CliError> {
     let extras = runner::Extras {
-        capture: arguments.capture.as_deref(),
+        capture: outputs.capture,
         local: arguments.local.as_deref(),
-        histories: Some(histories),
+        histories: Some(outputs.histories),
         files: Some(&good.files),
     };
-    let running = runner::start(&good.config, good.mapping.clone(), extras, settings)?;
+    let running = runner::start(&good.config, good.mapping.clone(), extras, outputs.settings)?;
     let (next, reloads) = attend(&running, arguments, asked, manager)?;
     let stops = asked.stop.load(Ordering::Relaxed);
     info!(
@@ -135,7 +158,7 @@ fn run_once(
     if stops {
         manager.borrow_mut().stopping();
     }
-    let rested = stop(running, asked, manager)?;
+    let rested = stop(running, asked, manager);
     if stops {
         return Ok(After::End { rested });
     }
@@ -158,7 +181,9 @@ fn attend(
     let mut told = false;
     let mut next = None;
     let mut reloads = false;
-    while !asked.stop.load(Ordering::Relaxed) && !running.wants_restart() && !reloads {
+    // A Reset is granted while nobody uses the gateway; an axis that was enabled since is not stopped by it.
+    let resets = || running.wants_restart() && !running.has_torque();
+    while !asked.stop.load(Ordering::Relaxed) && !resets() && !reloads {
         std::thread::sleep(LOOK_INTERVAL);
         manager.borrow_mut().look(Instant::now(), || running.status());
         if !told {
@@ -172,33 +197,43 @@ fn attend(
             return Err("the cycle thread has ended by itself; see above".into());
         }
         if asked.reload.swap(false, Ordering::Relaxed) {
-            next = reload(&arguments.config).or(next);
-            reloads = next.is_some() && !running.has_torque();
-            if next.is_some() && !reloads {
-                info!("an axis has torque: the new configuration takes effect at the next start");
-            }
+            (next, reloads) = replace(next, reload(&arguments.config), running.has_torque());
         }
     }
     Ok((next, reloads))
 }
 
 /// Stops a gateway, and logs what is missing; whether every axis stands.
-fn stop(
-    running: runner::RunningBox,
-    asked: &Asked,
-    manager: &RefCell<ServiceManager>,
-) -> Result<bool, CliError> {
+fn stop(running: runner::RunningBox, asked: &Asked, manager: &RefCell<ServiceManager>) -> bool {
     let status = running.reader();
     // The wait for the axes can be longer than a watchdog is patient.
     let stopped = running.stop(&|| {
         manager.borrow_mut().look(Instant::now(), || status.read());
         asked.hurry.load(Ordering::Relaxed)
-    })?;
-    if let Some(dropped) = stopped.dropped.filter(|dropped| *dropped > 0) {
-        warn!(dropped, "frames are missing in the recording");
-    }
+    });
     stopped.unrested.iter().for_each(|axis| error!("{axis}"));
-    Ok(stopped.unrested.is_empty())
+    match stopped.recording {
+        Some(Ok(dropped)) if dropped > 0 => warn!(dropped, "frames are missing in the recording"),
+        Some(Err(error)) => warn!(%error, "the recording has ended early"),
+        _ => {}
+    }
+    stopped.unrested.is_empty()
+}
+
+/// What takes effect at the next start once the files were read again, and whether that start is now. Files that are refused never put those
+/// into operation that were read before them.
+fn replace<T>(before: Option<T>, read: Option<T>, has_torque: bool) -> (Option<T>, bool) {
+    match (&read, before) {
+        (Some(_), _) if has_torque => {
+            info!("an axis has torque: the new configuration takes effect at the next start");
+        }
+        (None, Some(_)) => {
+            warn!("the configuration that was to take effect at the next start is not used either");
+        }
+        _ => {}
+    }
+    let starts = read.is_some() && !has_torque;
+    (read, starts)
 }
 
 /// Reads the files again; `None` when they are refused.
@@ -280,6 +315,32 @@ mod tests {
     use tracing::Level;
 
     use super::*;
+
+    #[test]
+    fn recording_of_a_later_run_has_its_number() {
+        for (path, number, expected) in [
+            ("/tmp/box.pcapng", 1, "/tmp/box.pcapng"),
+            ("/tmp/box.pcapng", 2, "/tmp/box.2.pcapng"),
+            ("box", 12, "box.12"),
+        ] {
+            assert_eq!(capture_of(Path::new(path), number), Path::new(expected));
+        }
+    }
+
+    #[test]
+    fn refused_files_start_nothing_and_drop_what_waited_for_the_next_start() {
+        for (before, read, torque, next, starts) in [
+            (None, Some(2), false, Some(2), true),
+            (None, Some(2), true, Some(2), false),
+            (Some(1), Some(2), true, Some(2), false),
+            (Some(1), Some(2), false, Some(2), true),
+            (Some(1), None, false, None, false),
+            (Some(1), None, true, None, false),
+            (None, None, false, None, false),
+        ] {
+            assert_eq!(replace(before, read, torque), (next, starts), "{before:?} {read:?} {torque}");
+        }
+    }
 
     #[test]
     fn file_or_variable_says_what_is_logged_and_a_wrong_variable_is_said() {

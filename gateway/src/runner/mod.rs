@@ -196,8 +196,8 @@ pub struct RunningBox {
 /// How a box has ended.
 #[derive(Debug)]
 pub struct Stopped {
-    /// How many records the recording lost; `None` without one.
-    pub dropped: Option<u64>,
+    /// How many records the recording lost, or why it has ended early; `None` without one.
+    pub recording: Option<io::Result<u64>>,
     /// Each axis that is not known to stand, with its speed and state.
     pub unrested: Vec<String>,
 }
@@ -617,10 +617,7 @@ impl RunningBox {
 
     /// Stops the axes, waits until they stand or have had the time that their own limits give them, takes the buses down, ends
     /// every server, and finishes the recording. `hurry` says when the axes are waited for no longer.
-    ///
-    /// # Errors
-    /// The recording cannot be finished.
-    pub fn stop(self, hurry: &dyn Fn() -> bool) -> io::Result<Stopped> {
+    pub fn stop(self, hurry: &dyn Fn() -> bool) -> Stopped {
         let unrested = match self.cycle.stop(hurry) {
             Ended::Down(unrested) => unrested.iter().map(|axis| describe(axis, &self.axes)).collect(),
             Ended::Unknown => vec!["the cycle thread has not ended: no axis is known to stand".to_owned()],
@@ -641,8 +638,8 @@ impl RunningBox {
             recording.close();
         }
         self.histories.counters.save();
-        let summary = self.recorder.map(Recorder::finish).transpose()?;
-        Ok(Stopped { dropped: summary.map(|summary| summary.dropped), unrested })
+        let recording = self.recorder.map(|recorder| recorder.finish().map(|summary| summary.dropped));
+        Stopped { recording, unrested }
     }
 }
 

@@ -129,16 +129,16 @@ pub fn run(arguments: &DemoArguments) -> Result<ExitCode, CliError> {
         cip_motion(seconds, &running, (clocks.as_ref(), listen), controller, &plans, &mut progress, &stop)
     };
     let status = running.status();
-    let stopped = running.stop(&|| hurry.load(Ordering::Relaxed))?;
+    let stopped = running.stop(&|| hurry.load(Ordering::Relaxed));
     progress.step(&format!(
         "{} bus cycles, {} late, {} telegrams lost",
         status.counters.cycles, status.counters.late_cycles, status.counters.lost_telegrams
     ));
-    if let Some(dropped) = stopped.dropped.filter(|dropped| *dropped > 0) {
-        eprintln!("warning: {dropped} frames are missing in the recording");
-    }
     if !stopped.unrested.is_empty() {
         return Err(stopped.unrested.join("\n").into());
+    }
+    if let Some(dropped) = stopped.recording.transpose()?.filter(|dropped| *dropped > 0) {
+        eprintln!("warning: {dropped} frames are missing in the recording");
     }
     let Ran { axes, failure } = outcome?;
     let capture = Some(arguments.capture.display().to_string());
