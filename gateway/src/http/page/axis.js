@@ -59,7 +59,7 @@ function showAxis({ status, history }, name) {
   const place = [axis.bus, axis.drive, axis.address].filter(Boolean).join(', ');
   setText(axisView.subtitle, axis.device ? `${axis.device} → ${place}` : place);
   const [controller, generic, drive] = axisView.level;
-  const old = axis.inhibits.includes('no_drive');
+  const old = isOld(axis);
   const fill = ([value, more], text, tone, small) => {
     setText(value, text);
     setClass(value, tone);
@@ -110,18 +110,21 @@ function isReported(key) {
 
 function showAxisValues(axis) {
   const { unit } = axis;
+  const [tone, more] = isOld(axis) ? ['old', ', last reported'] : ['', ''];
+  const reported = (name, text) => [name, `${text}${more}`, tone];
   const pairs = [
-    ['Position', number(axis.position, 6, unit)],
+    reported('Position', number(axis.position, 6, unit)),
     ['Position command', optional(axis.position_command, 6, unit)],
-    ['Velocity', number(axis.velocity, 6, `${unit}/s`)],
+    reported('Velocity', number(axis.velocity, 6, `${unit}/s`)),
     ['Velocity command', optional(axis.velocity_command, 6, `${unit}/s`)],
-    ['Torque', number(axis.torque, 1, '%')],
+    reported('Torque', number(axis.torque, 1, '%')),
     ['Torque command', optional(axis.torque_command, 1, '%')],
-    ['Following error', isReported('following_error') ? number(axis.following_error, 6, unit) : 'not reported'],
+    isReported('following_error') ? reported('Following error', number(axis.following_error, 6, unit))
+      : ['Following error', 'not reported'],
   ];
-  if (axis.current !== null) pairs.push(['Current', number(axis.current, 2, 'A')]);
-  if (axis.bus_voltage !== null) pairs.push(['DC bus', number(axis.bus_voltage, 1, 'V')]);
-  if (axis.temperature !== null) pairs.push(['Motor', number(axis.temperature, 1, '°C')]);
+  if (axis.current !== null) pairs.push(reported('Current', number(axis.current, 2, 'A')));
+  if (axis.bus_voltage !== null) pairs.push(reported('DC bus', number(axis.bus_voltage, 1, 'V')));
+  if (axis.temperature !== null) pairs.push(reported('Motor', number(axis.temperature, 1, '°C')));
   pairs.push(['Lost telegrams', whole(axis.lost_telegrams), lossTone(axis.lost_telegrams)]);
   pairs.push(['Faults so far', whole(axis.faults)]);
   list(axisView.values, pairs);
@@ -140,7 +143,8 @@ function showLimits(axis) {
     ['Acceleration', of(limits.acceleration, 1, `${unit}/s²`)],
     ['Torque', of(limits.torque, 1, '%')],
     ['Following error', of(limits.following_error, 6, unit)],
-    ['Reached now', reached.join(', ') || 'none', reached.length ? 'warn' : ''],
+    isOld(axis) ? ['Reached', `${reached.join(', ') || 'none'}, last reported`, 'old']
+      : ['Reached now', reached.join(', ') || 'none', reached.length ? 'warn' : ''],
     ['Inhibits', axis.inhibits.join(', ') || 'none', axis.inhibits.length ? 'warn' : ''],
   ]);
 }

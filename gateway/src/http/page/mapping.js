@@ -5,6 +5,8 @@ const MAPPED = ['Generic name', 'Value', 'CIP', 'Drive', 'Gateway'];
 const MAPPED_UNITS = {
   position_command: '', position: '', following_error: '', velocity_command: '/s', velocity: '/s',
 };
+// The commands are those of the gateway.
+const MAPPED_COMMANDS = ['position_command', 'velocity_command', 'torque_command'];
 const MAPPED_FIXED = { torque_command: '%', torque: '%', current: 'A', bus_voltage: 'V', temperature: '°C' };
 
 const mappingView = { name: null };
@@ -53,8 +55,12 @@ function showMapping({ status }, name) {
   setText(mappingView.subtitle, [axis.device, axis.bus, axis.drive, axis.address].filter(Boolean).join(', '));
   for (const { field, cell } of mappingView.live) {
     const value = axis[field];
+    const old = isOld(axis) && value !== null && !MAPPED_COMMANDS.includes(field);
     const unit = MAPPED_FIXED[field] || `${axis.unit}${MAPPED_UNITS[field] || ''}`;
     setText(cell, value === null ? 'not in the telegram' : number(value, unit.startsWith(axis.unit) ? 6 : 2, unit));
+    setClass(cell, old ? 'old' : 'value');
+    setText(cell.nextElementSibling, old ? 'last reported' : '');
+    cell.nextElementSibling.hidden = !old;
   }
   return undefined;
 }
