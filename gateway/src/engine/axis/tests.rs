@@ -208,7 +208,8 @@ fn rejected_fault_reset_leaves_no_enable_behind() {
 
 #[test]
 fn rejected_enable_is_tried_again_and_ends_with_a_fault_or_another_north_side() {
-    let ends: [(&str, fn(&mut AxisChannel), DriveState); 3] = [
+    type End = (&'static str, fn(&mut AxisChannel), DriveState);
+    let ends: [End; 3] = [
         ("nothing", |_| {}, DriveState::Starting),
         ("another north side", AxisChannel::begin_north, DriveState::Ready),
         (
