@@ -1,6 +1,6 @@
 """Controls an axis from the page of a gateway in headless Chromium: logs in, jogs, moves, stops, and closes the page while it jogs.
 
-    page_control.py CHROMIUM URL FOLDER TOKEN CERTIFICATE
+    page_control.py CHROMIUM URL FOLDER TOKEN CERTIFICATE SOCKET
 
 The browser does not know the certificate of the gateway, and is made to accept it.
 
@@ -9,6 +9,7 @@ Screenshots go to FOLDER.
 """
 
 import json
+import socket
 import ssl
 import sys
 import tempfile
@@ -71,10 +72,14 @@ def jog(url, begin, end, after=None):
     return {"fastest": fastest, "rest_ms": rest, "later": later, "state": axis(url)["state"]}
 
 
-def take_control(browser):
+def open_stream(browser):
     browser.until("!document.getElementById('take-control').disabled", "control is offered")
     click(browser, "take-control")
     browser.until("!document.getElementById('enable').disabled", "control")
+
+
+def take_control(browser):
+    open_stream(browser)
     click(browser, "enable")
     browser.until("!document.getElementById('jog-plus').disabled", "the axis is enabled")
 
@@ -141,6 +146,15 @@ def main():
             report["view"] = browser.value("control.said.text")
             browser.value("window.location.hash = '#/axis/turntable'")
             browser.until(f"{VIEW}.id === 'view-axis'", "the axis")
+            open_stream(browser)
+            browser.until(f"{SAYS} === 'You can enable the axis: nobody has it.'", "an axis that nobody has")
+            # Another client takes the axis first.
+            with socket.socket(socket.AF_UNIX) as other:
+                other.connect(sys.argv[6])
+                other.sendall(b"enable turntable\n")
+                report["other_has"] = other.recv(200).decode()
+                browser.until(f"document.getElementById('stop-bar').hidden && {SAYS}.startsWith('Another client')", "the other client")
+                report["state_of_other"] = axis(url)["state"]
             take_control(browser)
             browser.value("document.getElementById('control-velocity').value = '1'")
             browser.value("document.getElementById('control-acceleration').value = '20'")

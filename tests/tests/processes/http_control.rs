@@ -436,7 +436,8 @@ fn page_jogs_while_the_button_is_held_and_stops_when_it_closes() {
             .arg(format!("https://localhost:{}/", address.port()))
             .arg(path("control-pictures"))
             .arg(&token)
-            .arg(certificate("test-certificate.pem"));
+            .arg(certificate("test-certificate.pem"))
+            .arg(&gateway.socket);
         let output = browser.stdin(Stdio::null()).output().expect("python starts");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let report: Value = serde_json::from_slice(&output.stdout).expect("one object");
@@ -460,6 +461,12 @@ fn page_jogs_while_the_button_is_held_and_stops_when_it_closes() {
         assert!((report["moved"].as_f64().expect("a number") - 0.25).abs() < 0.002, "{report}");
         assert_eq!(report["faint"], Value::Array(Vec::new()), "too little contrast");
         assert_eq!(report["wide"], false, "wider than the screen");
+        // The stream of the page was open while another client took the axis, which kept its torque.
+        assert!(
+            report["other_has"].as_str().is_some_and(|reply| reply.starts_with("ok enable turntable ")),
+            "{report}"
+        );
+        assert_eq!(report["state_of_other"], "operating");
         // Left by hiding it, by another view, and at last by closing the page while the button is held.
         assert_eq!(report["view"], "Control was given back: another view was opened.");
         assert!(

@@ -82,6 +82,33 @@ fn every_view_of_the_page_works_in_a_browser() {
     });
 }
 
+#[test]
+fn page_begins_anew_after_a_restart_and_shows_what_a_lost_drive_has_reported_last() {
+    let Some(chromium) = peer::chromium_or_skip("the page in a browser") else { return };
+    let Some(python) = peer::python_or_skip("the page in a browser", "json") else { return };
+    in_real_time("page_begins_anew_after_a_restart_and_shows_what_a_lost_drive_has_reported_last", || {
+        // The page finds the gateway again at the same port.
+        let text =
+            CONFIGURATION.replacen("127.0.0.1:0", "127.0.2.104:8104", 1).replace("127.0.0.91", "127.0.2.104");
+        let mut gateway = Gateway::with("page-restart", &text);
+        until(address(&gateway), "/readyz", |code, _| code == 200);
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers/page_restart.py");
+        let mut browser = Command::new(&python);
+        browser.arg(script).arg(&chromium).arg("http://127.0.2.104:8104/").arg(path("page-restart.toml"));
+        browser.arg(gateway.run.id().to_string());
+        let output = browser.stdin(Stdio::null()).output().expect("python starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report: Value = serde_json::from_slice(&output.stdout).expect("one object");
+        assert_eq!((&report["before"], &report["after"]), (&"1".into(), &"1.2".into()));
+        let count = |key: &str| report[key].as_str().map(|text| text.matches("last reported").count());
+        assert!(count("values") >= Some(4), "{report}");
+        assert_eq!(count("limits"), Some(1), "{report}");
+        assert!(count("mapping") >= Some(3), "{report}");
+        let ended = gateway.run.terminate(std::time::Duration::from_secs(30));
+        assert_eq!(ended.code(), Some(0), "{}", gateway.log());
+    });
+}
+
 /// Each view has the values of the status, readable, in both schemes and sizes.
 fn views(report: &Value, status: &Value, faults: &Value) {
     let all = report["views"].as_array().expect("a list");

@@ -447,6 +447,36 @@ fn an_axis_whose_drive_was_rescaled_is_not_enabled_before_the_drive_was_commissi
 }
 
 #[test]
+fn axis_whose_drive_refuses_another_scaling_stays_ready() {
+    const FACTOR: Idn = Idn::VELOCITY_DATA_SCALING_FACTOR;
+    let mut sercos = Bench::sercos(|rig| {
+        let store = rig.line.slaves_mut()[0].store_mut();
+        // Write protected in CP4.
+        store.define(Definition::value(FACTOR, 0x4001_0001, "Velocity data scaling factor", 1));
+    });
+    let inhibits = |bench: &Bench| bench.rig.engine.axes()[0].feedback().inhibits;
+    let reply = sercos.say("write turntable S-0-0077 5");
+    let refused = "error write turntable read-only: S-0-0077: the drive refuses the operation data with 0x7005: operation data is \
+                   write protected at this time\n";
+    assert_eq!(reply, refused);
+    sercos.rig.run_for(millis(100));
+    assert!(!inhibits(&sercos).contains(Inhibits::TRANSFER_ACTIVE));
+    let mut canopen = Bench::canopen("", |_| {});
+    for line in ["write turntable 6091h.9 2", "command turntable 1011:09 start"] {
+        let reply = canopen.say(line);
+        assert!(reply.starts_with("error ") && !reply.contains("commissioned again"), "{reply}");
+        canopen.rig.run_for(millis(100));
+        assert!(!inhibits(&canopen).contains(Inhibits::TRANSFER_ACTIVE), "{line}");
+    }
+    // A refusal does not undo what was changed before it.
+    canopen.object("write turntable 6091h.1 2");
+    let reply = canopen.say("command turntable 1011:09 start");
+    assert!(reply.starts_with("error "), "{reply}");
+    canopen.rig.run_for(millis(100));
+    assert!(inhibits(&canopen).contains(Inhibits::TRANSFER_ACTIVE));
+}
+
+#[test]
 fn lists_say_where_they_are_from() {
     let mut bench = Bench::sercos(with_gain);
     let list = bench.say("list turntable backup");

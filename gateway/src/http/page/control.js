@@ -1,8 +1,11 @@
 
 // ---- local control of an axis: everything stops when this page goes, is hidden, or is not heard ------------------
 
-// The key of the session is kept in the memory of the page alone. `held` is the direction of the jog that is held.
-const control = { offer: null, key: null, socket: null, beat: 0, axis: null, state: '', held: null, nodes: null, allowed: false };
+// The key of the session is kept in the memory of the page alone. `held` is the direction of the jog that is held. `owner` is that of the
+// axis by the stream; `ours` says that an order of this stream may be why it is `local`, and `pending` counts orders without a reply.
+const control = {
+  offer: null, key: null, socket: null, beat: 0, axis: null, state: '', owner: '', ours: false, pending: 0, held: null, nodes: null, allowed: false,
+};
 
 const DECIMAL = /^\d{1,9}(\.\d{1,9})?$/;
 const SIGNED = /^[+-]?\d{1,9}(\.\d{1,9})?$/;
@@ -130,7 +133,8 @@ function obstacle(axis) {
   if (!control.offer.control) return ['Axes cannot be controlled from this page: no token is configured (`token` in `[http]`).', 'waits'];
   if (axis.owner === 'controller') return ['A controller owns this axis. Local control has to wait until it has disconnected.', 'waits'];
   if (control.key === null) return ['Log in with the token to control this axis.', ''];
-  if (axis.owner === 'local' && !isOpen()) return ['Another client of local control has this axis.', 'waits'];
+  // An open stream alone is no control: an axis is taken by the first order.
+  if (isOpen() ? control.owner === 'local' && !control.ours : axis.owner === 'local') return ['Another client of local control has this axis.', 'waits'];
   return null;
 }
 
@@ -147,7 +151,7 @@ function showControl(axis) {
     setClass(nodes.says, `says ${why[1]}`.trim());
   } else if (why === null && control.said === null) {
     const plain = control.offer.encrypted ? '' : ' This connection is not encrypted.';
-    setText(nodes.says, isOpen() ? 'You have control.' : `You are logged in.${plain}`);
+    setText(nodes.says, !isOpen() ? `You are logged in.${plain}` : control.ours ? 'You have control.' : 'You can enable the axis: nobody has it.');
     setClass(nodes.says, 'says');
   }
   showButtons();
@@ -206,8 +210,7 @@ function takeControl() {
     ['axisbridge.control', `axisbridge.session.${control.key}`]);
   let opened = false;
   control.socket = socket;
-  control.beat = 0;
-  control.state = '';
+  Object.assign(control, { beat: 0, state: '', owner: '', ours: false, pending: 0 });
   say('');
   socket.addEventListener('open', () => {
     opened = true;
@@ -251,9 +254,17 @@ function send(line) {
   if (isOpen()) control.socket.send(`${control.beat} ${line}`);
 }
 
+// An order takes an axis that nobody has.
+function sendOrder(line) {
+  if (!isOpen()) return;
+  control.ours = true;
+  control.pending += 1;
+  send(line);
+}
+
 function order(word, rest) {
   say('');
-  send(`${word} ${control.axis}${rest || ''}`);
+  sendOrder(`${word} ${control.axis}${rest || ''}`);
 }
 
 function withAcceleration() {
@@ -282,7 +293,7 @@ function hold(sign, node) {
   control.held = { node, line: `jog ${control.axis} ${sign}${velocity.value.trim()}${withAcceleration()}` };
   node.classList.add('held');
   say('');
-  send(control.held.line);
+  sendOrder(control.held.line);
 }
 
 function release() {
@@ -290,34 +301,41 @@ function release() {
   if (held === null) return;
   control.held = null;
   held.node.classList.remove('held');
-  send(`stop ${control.axis}`);
+  sendOrder(`stop ${control.axis}`);
 }
 
 function stopAxis() {
   release();
-  send(`stop ${control.axis}`);
+  sendOrder(`stop ${control.axis}`);
 }
 
+const ORDERS = ['enable', 'disable', 'reset', 'move', 'home', 'jog', 'stop'];
 const WORDS = (reply) => Object.fromEntries(reply.split(' ').filter((word) => word.includes('=')).map((word) => word.split('=')));
 
 // A beat is answered at once: by the jog that is held, or a question for the state.
 function hear(text) {
   if (text.startsWith('beat ')) {
     control.beat = Number(text.slice(5));
-    send(control.held ? control.held.line : `status ${control.axis}`);
+    if (control.held) sendOrder(control.held.line);
+    else send(`status ${control.axis}`);
     return;
   }
   const [, verdict, word, axis, rest] = /^(ok|error) (\S+) (\S+) ?(.*)$/.exec(text) || [];
+  if (ORDERS.includes(word)) control.pending = Math.max(0, control.pending - 1);
   if (word === 'write') {
     hearWrite(verdict, rest);
   } else if (verdict === 'error') {
     const [, code, why] = /^(\S+): (.*)$/.exec(rest) || [null, '', rest];
     if (word === 'jog') release();
+    if (code === 'held') control.ours = false;
     // A stop or a move that gives way to what was asked after it.
     if (code !== 'replaced') say(`${word}: ${why}`, 'fault');
   } else if (axis === control.axis) {
     const known = WORDS(rest);
     control.state = known.state || '';
+    control.owner = known.owner || '';
+    // It was given up again, or never taken: the next one who takes it may be somebody else.
+    if (control.owner !== 'local' && control.pending === 0) control.ours = false;
     const { nodes } = control;
     setText(nodes.live, `State ${known.state}, position ${known.position} ${known.unit}, velocity ${known.velocity} ${known.unit}/s`);
     if (['move', 'home', 'enable', 'disable', 'reset'].includes(word)) say(`${word}: done`, 'good');

@@ -132,10 +132,12 @@ function showBuses(buses) {
   });
 }
 
+// Whether nothing is heard from the drive: what it has reported before is not live.
+const isOld = (axis) => axis.inhibits.includes('no_drive');
+
 function axisCells(axis) {
   const drive = [axis.bus, axis.drive].filter(Boolean).join(', ');
-  // Nothing is heard from the drive: what it has reported before is not live.
-  const old = axis.inhibits.includes('no_drive');
+  const old = isOld(axis);
   const tone = old ? 'old' : '';
   const mode = axis.mode === 'none' ? '' : `mode ${axis.mode}`;
   return [
@@ -314,6 +316,19 @@ function showOverview({ health, status, history }) {
   fetchHistory('log', `/api/v1/log?lines=${LINES_SHOWN}`, history.log, showLog);
 }
 
+// Whether the next event may be of another process: with another configuration, and counters that begin anew.
+let isAnew = false;
+
+// What was fetched once is of the configuration of before: every view is built again.
+function beginAnew() {
+  giveBack('Control was given back: the gateway has started again.');
+  seen.faults = seen.log = null;
+  axisView.name = mappingView.name = busView.name = null;
+  timeView.built = false;
+  control.offer = null;
+  isAnew = false;
+}
+
 let source = null;
 let lastEventAt = null;
 let lastLiveAt = '';
@@ -336,14 +351,14 @@ function connect() {
   source = new EventSource('/events');
   source.addEventListener('status', (event) => {
     const look = JSON.parse(event.data);
+    if (isAnew || (last && look.status.uptime_s < last.status.uptime_s)) beginAnew();
     show(look);
     lastEventAt = performance.now();
     if (look.health.alive) live();
     else stale(`The gateway has stopped working: ${look.health.reason}.`);
   });
   source.addEventListener('error', () => {
-    // Another process counts anew.
-    seen.faults = seen.log = null;
+    isAnew = true;
     stale('No connection to the gateway; trying again.');
     // A browser gives up when it is answered with an error, such as too many viewers.
     if (source.readyState === EventSource.CLOSED) setTimeout(connect, RECONNECT_MS);
