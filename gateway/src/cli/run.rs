@@ -220,8 +220,8 @@ fn stop(running: runner::RunningBox, asked: &Asked, manager: &RefCell<ServiceMan
     stopped.unrested.is_empty()
 }
 
-/// What takes effect at the next start once the files were read again, and whether that start is now. Files that are refused never put those
-/// into operation that were read before them.
+/// What takes effect at the next start once the files were read again, and whether that start is now. Files that are refused never put
+/// those into operation that were read before them.
 fn replace<T>(before: Option<T>, read: Option<T>, has_torque: bool) -> (Option<T>, bool) {
     match (&read, before) {
         (Some(_), _) if has_torque => {

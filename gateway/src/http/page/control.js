@@ -4,7 +4,8 @@
 // The key of the session is kept in the memory of the page alone. `held` is the direction of the jog that is held. `owner` is that of the
 // axis by the stream; `ours` says that an order of this stream may be why it is `local`, and `pending` counts orders without a reply.
 const control = {
-  offer: null, key: null, socket: null, beat: 0, axis: null, state: '', owner: '', ours: false, pending: 0, held: null, nodes: null, allowed: false,
+  offer: null, key: null, socket: null, beat: 0, axis: null, nodes: null, allowed: false,
+  state: '', owner: '', ours: false, pending: 0, held: null,
 };
 
 const DECIMAL = /^\d{1,9}(\.\d{1,9})?$/;
@@ -134,7 +135,8 @@ function obstacle(axis) {
   if (axis.owner === 'controller') return ['A controller owns this axis. Local control has to wait until it has disconnected.', 'waits'];
   if (control.key === null) return ['Log in with the token to control this axis.', ''];
   // An open stream alone is no control: an axis is taken by the first order.
-  if (isOpen() ? control.owner === 'local' && !control.ours : axis.owner === 'local') return ['Another client of local control has this axis.', 'waits'];
+  const isOthers = isOpen() ? control.owner === 'local' && !control.ours : axis.owner === 'local';
+  if (isOthers) return ['Another client of local control has this axis.', 'waits'];
   return null;
 }
 
@@ -151,7 +153,8 @@ function showControl(axis) {
     setClass(nodes.says, `says ${why[1]}`.trim());
   } else if (why === null && control.said === null) {
     const plain = control.offer.encrypted ? '' : ' This connection is not encrypted.';
-    setText(nodes.says, !isOpen() ? `You are logged in.${plain}` : control.ours ? 'You have control.' : 'You can enable the axis: nobody has it.');
+    const open = control.ours ? 'You have control.' : 'You can enable the axis: nobody has it.';
+    setText(nodes.says, isOpen() ? open : `You are logged in.${plain}`);
     setClass(nodes.says, 'says');
   }
   showButtons();
