@@ -3,9 +3,11 @@
 //! A job goes through its items one by one. An item that the drive has to answer leaves the job waiting; the answer
 //! resumes it. The whole request is checked for its form before the first item is touched.
 
+use core::cmp::Ordering;
+
 use arrayvec::ArrayVec;
 
-use crate::device::attribute::{DataType, Entry};
+use crate::device::attribute::{AttributeTable, DataType};
 use crate::wire::motion::attribute_list::{
     AttributeSelector, GetRequest, HEAD_LEN, ListWriter, SetRequest, SetStatus, take_value,
 };
@@ -70,12 +72,18 @@ pub(crate) struct ListJob {
 
 impl ListJob {
     /// Checks the form of a request and starts its job. `limit` is the most octets of the response body: a list of Sets
-    /// whose statuses will not fit is refused before the first value is written.
+    /// whose statuses will not fit is refused before the first value is written. `table` has the lengths of the values in a
+    /// Set_Attribute_List.
     ///
     /// # Errors
     /// The request is malformed.
     // Flat: one arm per format of a list.
-    pub fn new(format: ListFormat, body: &[u8], limit: usize) -> Result<Self, GeneralStatus> {
+    pub fn new(
+        format: ListFormat,
+        body: &[u8],
+        limit: usize,
+        table: &AttributeTable,
+    ) -> Result<Self, GeneralStatus> {
         let mut request = ArrayVec::new();
         request.try_extend_from_slice(body).map_err(|_| GeneralStatus::TOO_MUCH_DATA)?;
         let (at, left) = match format {
@@ -93,15 +101,15 @@ impl ListJob {
             }
             ListFormat::CommonGet | ListFormat::CommonSet => {
                 let left = Reader::new(body).u16("count").map_err(|_| GeneralStatus::NOT_ENOUGH_DATA)?;
-                if format == ListFormat::CommonGet && body.len() != 2 + 2 * usize::from(left) {
-                    let short = body.len() < 2 + 2 * usize::from(left);
-                    return Err(if short {
-                        GeneralStatus::NOT_ENOUGH_DATA
-                    } else {
-                        GeneralStatus::TOO_MUCH_DATA
-                    });
+                let end = match format {
+                    ListFormat::CommonGet => 2 + 2 * usize::from(left),
+                    _ => end_of_sets(body, left, table)?,
+                };
+                match body.len().cmp(&end) {
+                    Ordering::Less => return Err(GeneralStatus::NOT_ENOUGH_DATA),
+                    Ordering::Equal => (2, left),
+                    Ordering::Greater => return Err(GeneralStatus::TOO_MUCH_DATA),
                 }
-                (2, left)
             }
             ListFormat::SingleGet(_) if !body.is_empty() => return Err(GeneralStatus::TOO_MUCH_DATA),
             ListFormat::SingleGet(_) | ListFormat::SingleSet(_) => (0, 1),
@@ -125,8 +133,8 @@ impl ListJob {
         item.value.as_ref().and_then(|range| self.request.get(range.clone())).unwrap_or_default()
     }
 
-    /// Takes the next item. `find` gives the attribute of an ID, which a Set_Attribute_List needs to find its length.
-    pub fn next_item<'t>(&mut self, find: impl Fn(u16) -> Option<&'t Entry>) -> Option<Item> {
+    /// Takes the next item. `table` is the one of [`ListJob::new`].
+    pub fn next_item(&mut self, table: &AttributeTable) -> Option<Item> {
         self.left = self.left.checked_sub(1)?;
         let rest = self.request.get(self.at..).unwrap_or_default();
         match self.format {
@@ -149,23 +157,13 @@ impl ListJob {
                 Some(Item { id, selector: None, value: None })
             }
             ListFormat::CommonSet => {
-                let Ok(id) = Reader::new(rest).u16("attribute") else {
-                    self.fail(GeneralStatus::NOT_ENOUGH_DATA);
-                    return None;
-                };
-                // Without its length the rest of the list cannot be read: the item is refused and the last one.
-                let Some(entry) = find(id) else {
-                    self.left = 0;
-                    return Some(Item { id, selector: None, value: Some(0..0) });
-                };
-                let start = self.at + 2;
-                let size = match entry.definition.data_type {
-                    DataType::ShortString => 1 + self.request.get(start).map_or(0, |len| usize::from(*len)),
-                    _ => entry.definition.size(),
-                };
-                let end = (start + size).min(self.request.len());
-                self.at = end;
-                Some(Item { id, selector: None, value: Some(start..end) })
+                let (id, value) = set_item(&self.request, self.at, table).ok()?;
+                match &value {
+                    Some(value) => self.at = value.end,
+                    // Without its length the rest of the list cannot be read: the item is refused and the last one.
+                    None => self.left = 0,
+                }
+                Some(Item { id, selector: None, value: Some(value.unwrap_or_default()) })
             }
             ListFormat::SingleGet(id) => Some(Item { id, selector: None, value: None }),
             ListFormat::SingleSet(id) => {
@@ -246,6 +244,40 @@ where
     if rest(&list) > 0 { Err(GeneralStatus::TOO_MUCH_DATA) } else { Ok(()) }
 }
 
+/// Where a list of so many Sets ends, each an attribute number and the whole value; behind an attribute that nobody has the
+/// rest cannot be read, and is taken for a part of the list.
+fn end_of_sets(body: &[u8], count: u16, table: &AttributeTable) -> Result<usize, GeneralStatus> {
+    let mut at = 2;
+    for _ in 0..count {
+        match set_item(body, at, table)? {
+            (_, Some(value)) => at = value.end,
+            (_, None) => return Ok(body.len()),
+        }
+    }
+    Ok(at)
+}
+
+/// The item of a Set_Attribute_List at this place: the attribute, and where its value is; `None` if nobody has the attribute.
+fn set_item(
+    body: &[u8],
+    at: usize,
+    table: &AttributeTable,
+) -> Result<(u16, Option<core::ops::Range<usize>>), GeneralStatus> {
+    let rest = body.get(at..).unwrap_or_default();
+    let id = Reader::new(rest).u16("attribute").map_err(|_| GeneralStatus::NOT_ENOUGH_DATA)?;
+    let Some(entry) = table.find(id) else { return Ok((id, None)) };
+    let start = at + 2;
+    let size = match entry.definition.data_type {
+        DataType::ShortString => 1 + usize::from(*body.get(start).ok_or(GeneralStatus::NOT_ENOUGH_DATA)?),
+        _ => entry.definition.size(),
+    };
+    let value = start..start + size;
+    if value.end > body.len() {
+        return Err(GeneralStatus::NOT_ENOUGH_DATA);
+    }
+    Ok((id, Some(value)))
+}
+
 /// Writes one item of an axis list behind a head in `scratch`; returns the octets with the head.
 fn list_item(format: ListFormat, item: &Item, outcome: Outcome<'_>, scratch: &mut [u8]) -> Option<usize> {
     let mut writer = ListWriter::new(scratch).ok()?;
@@ -282,7 +314,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::device::attribute::{Access, AttributeDefinition, AttributeTable, Scope};
+    use crate::device::attribute::{Access, AttributeDefinition, Scope};
 
     const OK: GeneralStatus = GeneralStatus::SUCCESS;
 
@@ -297,14 +329,18 @@ mod tests {
             |id, data_type| AttributeDefinition::new(Scope::Instance, id, data_type, Access::Set, "a");
         let table = AttributeTable::new(
             Scope::Instance,
-            &[definition(461, DataType::Real), definition(462, DataType::Uint)],
+            &[
+                definition(461, DataType::Real),
+                definition(462, DataType::Uint),
+                definition(463, DataType::ShortString),
+            ],
         )
         .expect("a table");
-        let mut job = match ListJob::new(format, body, limit) {
+        let mut job = match ListJob::new(format, body, limit, &table) {
             Ok(job) => job,
             Err(status) => return (status, Vec::new()),
         };
-        while let Some(item) = job.next_item(|id| table.find(id)) {
+        while let Some(item) = job.next_item(&table) {
             let value = job.value(&item).to_vec();
             job.answer(&item, outcome(&item, &value), limit);
         }
@@ -350,6 +386,30 @@ mod tests {
         assert_eq!(run(ListFormat::CommonGet, &short, 100, touched).0, GeneralStatus::NOT_ENOUGH_DATA);
         let long = [1, 0, 1, 0, 2];
         assert_eq!(run(ListFormat::CommonGet, &long, 100, touched).0, GeneralStatus::TOO_MUCH_DATA);
+    }
+
+    /// 462 has two octets, 461 four, and 463 is a string.
+    #[test]
+    fn a_malformed_set_attribute_list_touches_nothing() {
+        let (short, long) = (GeneralStatus::NOT_ENOUGH_DATA, GeneralStatus::TOO_MUCH_DATA);
+        for (what, body, expected) in [
+            ("no count", &[1][..], short),
+            ("no item", &[1, 0], short),
+            ("one item of two", &[2, 0, 0xCE, 1, 7, 8], short),
+            ("half an attribute number", &[2, 0, 0xCE, 1, 7, 8, 0xCD], short),
+            ("a value that is cut", &[2, 0, 0xCE, 1, 7, 8, 0xCD, 1, 1, 2, 3], short),
+            ("no length of a string", &[1, 0, 0xCF, 1], short),
+            ("a string that is cut", &[1, 0, 0xCF, 1, 3, b'a', b'b'], short),
+            ("octets behind the last item", &[1, 0, 0xCE, 1, 7, 8, 9], long),
+            ("octets behind a string", &[1, 0, 0xCF, 1, 1, b'a', b'b'], long),
+            ("octets and no item", &[0, 0, 9], long),
+        ] {
+            let touched = |_: &Item, _: &[u8]| -> Outcome<'_> { panic!("an item was handed out: {what}") };
+            assert_eq!(run(ListFormat::CommonSet, body, 100, touched), (expected, vec![]), "{what}");
+        }
+        let good = [2, 0, 0xCF, 1, 1, b'a', 0xCE, 1, 7, 8];
+        let answer = vec![2, 0, 0xCF, 1, 0, 0, 0xCE, 1, 0, 0];
+        assert_eq!(run(ListFormat::CommonSet, &good, 100, |_, _| Outcome::Done), (OK, answer));
     }
 
     #[test]

@@ -155,9 +155,15 @@ impl AttributeWorker {
     ///
     /// # Errors
     /// The request is malformed.
-    pub fn start(&mut self, format: ListFormat, body: &[u8], limit: usize) -> Result<(), GeneralStatus> {
+    pub fn start(
+        &mut self,
+        format: ListFormat,
+        body: &[u8],
+        limit: usize,
+        table: &AttributeTable,
+    ) -> Result<(), GeneralStatus> {
         *self = Self { limit, ..Self::default() };
-        self.job = Some(ListJob::new(format, body, limit)?);
+        self.job = Some(ListJob::new(format, body, limit, table)?);
         Ok(())
     }
 
@@ -172,7 +178,7 @@ impl AttributeWorker {
             return None;
         }
         let job = self.job.as_mut()?;
-        while let Some(item) = job.next_item(|id| space.table.find(id)) {
+        while let Some(item) = job.next_item(space.table) {
             match space.execute(&item, job.value(&item)) {
                 Executed::Value(part) => {
                     let entry = space.table.find(item.id);
@@ -254,7 +260,7 @@ mod tests {
             let table = table();
             let store = AttributeStore::new(&table);
             let mut worker = AttributeWorker::default();
-            worker.start(format, body, 500).expect("a request");
+            worker.start(format, body, 500, &table).expect("a request");
             Self { table, store, tickets: 0, worker }
         }
 

@@ -114,7 +114,13 @@ impl ExplicitSide {
             Started::List(format) => {
                 let sets = matches!(format, ListFormat::CommonSet | ListFormat::SingleSet(_));
                 engine.progress.attribute_set |= sets;
-                match self.worker.start(format, &request.data, EXPLICIT_DATA_MAX) {
+                let begun = match engine.instances.service(instance) {
+                    Some((_, space)) => {
+                        self.worker.start(format, &request.data, EXPLICIT_DATA_MAX, space.table)
+                    }
+                    None => Err(GeneralStatus::PATH_DESTINATION_UNKNOWN),
+                };
+                match begun {
                     Ok(()) => {
                         let changes = !owner::reads(request.service);
                         self.current = Some(Current { token, instance, originator, changes });

@@ -143,10 +143,10 @@ pub(super) fn execute(
 ) {
     let mut response = [0; BODY_MAX];
     let started = start(engine, instance, request.service, request.data, system_time, &mut response);
-    let Some(channel) = engine.instances.channel(instance) else { return };
+    let Some((channel, space)) = engine.instances.service(instance) else { return };
     match started {
         Started::Answered(status, len) => channel.answer(status, &response[..len]),
-        Started::List(format) => match channel.worker.start(format, request.data, BODY_MAX) {
+        Started::List(format) => match channel.worker.start(format, request.data, BODY_MAX, space.table) {
             Ok(()) => run(engine, instance),
             Err(status) => channel.answer(status, &[]),
         },
