@@ -33,7 +33,9 @@ impl Checked<'_> {
     fn is_known_and_finite(&self, axes: usize) -> (bool, bool) {
         match self {
             Self::Variable(frame) => frame.instances().fold((true, true), |(known, finite), instance| {
-                let number = instance.cyclic.is_none_or(|block| block.values.is_finite());
+                let values = instance.cyclic.is_none_or(|block| block.values.is_finite());
+                let data = instance.events.as_ref().and_then(|events| events.extended);
+                let number = values && data.is_none_or(|data| data.is_finite());
                 (known && usize::from(instance.number) <= axes, finite && number)
             }),
             Self::Fixed(command) => (true, command.values.is_finite()),
@@ -161,7 +163,7 @@ impl Engine {
             connection.answer(header.update_id, now);
             self.statistics.counters.not_valid += 1;
             self.echo.clear();
-            self.node_control(before, header.node_control);
+            self.node_control(before, header.node_control, now);
             return;
         }
         let lost = match connection.update(header.update_id) {
@@ -182,7 +184,7 @@ impl Engine {
         let arrived = system_time.map(|system| system - now.since(arrival));
         connection.received_at = arrived.map_or(0, |t| t.0);
         let paced_at = connection.stamps.arrive(arrival, lost);
-        self.node_control(before, header.node_control);
+        self.node_control(before, header.node_control, now);
         self.statistics.lost(lost);
         if u64::from(lost) > self.instances.high_limit() {
             self.node.raise(NodeFault::CONNECTION_UPDATE);
@@ -209,7 +211,7 @@ impl Engine {
     }
 
     /// Node Control bits that act on the node itself.
-    fn node_control(&mut self, before: NodeControl, after: NodeControl) {
+    fn node_control(&mut self, before: NodeControl, after: NodeControl, now: MonotonicTime) {
         let reset = NodeControl::FAULT_RESET;
         if after.contains(reset) && !before.contains(reset) {
             self.node.reset();
@@ -218,6 +220,8 @@ impl Engine {
             && let Some(connection) = &mut self.connection
         {
             connection.schedule.desynchronize();
+            // Nobody compares the clocks any more.
+            self.node.skew(false, now);
         }
     }
 

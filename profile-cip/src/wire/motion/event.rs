@@ -175,6 +175,12 @@ fn bits<const N: usize>(present: [bool; N]) -> u8 {
 }
 
 impl ExtendedEventData {
+    /// Whether threshold and time are finite numbers.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        [self.home_torque_threshold, self.home_torque_time].iter().flatten().all(|value| value.is_finite())
+    }
+
     /// The Registration, Home and Watch Data Set octets that the present values give.
     #[must_use]
     pub fn data_sets(&self) -> ExtendedAck {

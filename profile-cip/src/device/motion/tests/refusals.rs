@@ -6,6 +6,7 @@ use crate::device::axis::state::AxisState;
 use crate::device::motion::io_counters::MotionCounters;
 use crate::wire::Error;
 use crate::wire::motion::codes::NodeFault;
+use crate::wire::motion::event::ExtendedEventData;
 use profile_generic::wire::Expected;
 
 /// Sends a packet to a running rig, and returns the counters that changed, the node fault and the follow-up state.
@@ -97,6 +98,20 @@ fn wrong_forms_raise_node_fault_4() {
             rig.command_packet()
         });
         assert_eq!((counters, fault), (MotionCounters { not_finite: 1, ..NONE }, format));
+    }
+    for (threshold, time) in [(f32::NAN, 0.5), (f32::NEG_INFINITY, 0.5), (40.0, f32::NAN)] {
+        let (counters, fault, _) = after(|rig| {
+            let data = ExtendedEventData {
+                home_torque_threshold: Some(threshold),
+                home_torque_time: Some(time),
+                ..ExtendedEventData::default()
+            };
+            let checking = EventChecking::HOME_TORQUE;
+            rig.events = Some(CommandEvents { checking, extended: Some(data), ..CommandEvents::default() });
+            rig.command_packet()
+        });
+        let expected = (MotionCounters { not_finite: 1, ..NONE }, format);
+        assert_eq!((counters, fault), expected, "{threshold} for {time} s");
     }
 }
 

@@ -474,6 +474,27 @@ fn skewed_clocks_keep_the_device_asynchronous_and_fault_after_a_minute() {
     assert_eq!(rig.device.node_fault(), NodeFault::CLOCK_SKEW);
 }
 
+/// The minute of clock skew is one in which the controller asks for synchronous operation (clause 7-1.3).
+#[test]
+fn skew_of_an_earlier_request_for_synchronous_operation_does_not_count() {
+    let mut rig = Rig::running();
+    let skew = 3 * i64::try_from(PERIOD).expect("fits");
+    let ask = |rig: &mut Rig| {
+        rig.control |= NodeControl::SYNC_CONTROL;
+        rig.time = TimeDataSet::TIME_STAMP;
+        send_aged(rig, skew);
+        rig.run_device();
+        rig.now += PERIOD;
+        rig.control -= NodeControl::SYNC_CONTROL;
+        rig.time = TimeDataSet::empty();
+        assert_eq!(rig.device.node_alarm(), NodeAlarm::CLOCK_SKEW);
+    };
+    ask(&mut rig);
+    rig.cycles(usize::try_from(61_000_000_000 / PERIOD).expect("fits"));
+    ask(&mut rig);
+    assert_eq!((rig.device.node_fault(), rig.state(0)), (NodeFault::NONE, AxisState::Running));
+}
+
 #[test]
 fn clocks_that_agree_again_within_the_minute_lead_to_synchronous_operation() {
     let mut rig = Rig::running();
