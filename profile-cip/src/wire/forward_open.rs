@@ -28,6 +28,10 @@ use super::triad::{ConnectionTriad, TRIAD_LEN};
 use super::{Error, Reader, Writer};
 use core::fmt;
 use profile_generic::open_code;
+use profile_generic::time::DurationNs;
+
+/// A connection is not timed out sooner than this before its first message.
+pub const FIRST_MESSAGE_TIMEOUT: DurationNs = DurationNs::from_secs(10);
 
 open_code! {
     /// Production trigger of a transport.

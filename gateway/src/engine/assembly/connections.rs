@@ -14,6 +14,7 @@ use profile_cip::assembly::{Assemblies, Link, RUN, RUN_IDLE_LEN};
 use profile_cip::device::connection_manager::LISTENERS_MAX;
 use profile_cip::device::motion_link::{AssemblyRole, OpenParameters, OpenRefusal};
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram};
+use profile_cip::wire::forward_open::FIRST_MESSAGE_TIMEOUT;
 use profile_cip::wire::status::{ConnectionStatus, GeneralStatus};
 use profile_generic::interpolation::ArrivalClock;
 use profile_generic::time::{DurationNs, MonotonicTime};
@@ -24,9 +25,6 @@ use crate::engine::port::{FRAME_MAX, NorthPort};
 
 /// Datagrams taken in one call.
 const DATAGRAMS_PER_CYCLE: usize = 64;
-
-/// A connection is not timed out sooner than this before its first datagram.
-const FIRST_DATAGRAM: DurationNs = DurationNs::from_secs(10);
 
 /// What connections have counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -111,7 +109,7 @@ impl Connection {
         Self {
             open,
             heard: now,
-            deadline: now + timeout(&open).max(FIRST_DATAGRAM),
+            deadline: now + timeout(&open).max(FIRST_MESSAGE_TIMEOUT),
             port: None,
             received: None,
             own: open.group().is_none().then(|| Stream::new(now, &open)),

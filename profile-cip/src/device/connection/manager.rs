@@ -17,7 +17,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 use super::refusal::Refusal;
 use crate::device::motion_link::{AssemblyRole, ConnectionTriad, OpenParameters, Token};
 use crate::device::session_slot::SessionSlot;
-use crate::wire::forward_open::{ForwardOpen, Trigger};
+use crate::wire::forward_open::{FIRST_MESSAGE_TIMEOUT, ForwardOpen, Trigger};
 use crate::wire::network_parameters::ConnectionType;
 use crate::wire::status::ConnectionStatus;
 
@@ -44,9 +44,6 @@ pub const EXPLICIT_SIZE_MAX: u16 = 4002;
 
 /// Smallest explicit connection in bytes: sequence count and an empty reply.
 pub const EXPLICIT_SIZE_MIN: u16 = 6;
-
-/// A connection is not timed out sooner than this before its first message.
-const FIRST_MESSAGE: DurationNs = DurationNs::from_secs(10);
 
 /// The motion connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -256,7 +253,7 @@ impl ConnectionManager {
             multiplier: open.timeout_multiplier,
             timeout,
             heard: now,
-            deadline: now + timeout.max(FIRST_MESSAGE),
+            deadline: now + timeout.max(FIRST_MESSAGE_TIMEOUT),
             last_sequence: None,
             last_reply: Vec::new(),
         });

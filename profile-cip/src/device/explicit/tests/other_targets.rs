@@ -13,7 +13,8 @@ use crate::device::motion::device::{DeviceConfig, MotionDevice};
 use crate::wire::cpf::ItemType;
 use crate::wire::encapsulation::{Command, EncapsulationStatus};
 use crate::wire::forward_open::ForwardOpen;
-use crate::wire::motion::Format;
+use crate::wire::motion::codes::{NodeControl, TimeDataSet};
+use crate::wire::motion::{CommandHeader, CommandWriter, Format};
 use crate::wire::status::Service;
 
 /// A rig with the real motion device behind the adapter, both on one virtual clock.
@@ -56,11 +57,22 @@ impl Whole {
     }
 }
 
-/// A well-known stack refuses for minutes.
+/// A well-known stack refuses for minutes. Until its first update an owner has ten seconds.
 #[test]
 fn a_vanished_exclusive_owner_blocks_nobody_once_its_time_is_up() {
+    let mut update = [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    let header = CommandHeader {
+        update_id: 1,
+        node_control: NodeControl::empty(),
+        instance_count: 0,
+        last_received_id: 0,
+        time_stamp: None,
+        time_offset: None,
+        diagnostics: TimeDataSet::empty(),
+    };
+    let len = 2 + CommandWriter::new(&mut update[2..], &header).expect("room").finish();
     // Every multiplier: 4, 8, .. 512 intervals of 2 ms.
-    for code in 0..8u8 {
+    for (code, is_heard) in (0..8u8).flat_map(|code| [(code, false), (code, true)]) {
         let timeout = DurationNs::from_millis(2 * (4 << code));
         let mut all = Whole::new();
         let (a, b) = (all.rig.client(1), all.rig.client(2));
@@ -69,15 +81,19 @@ fn a_vanished_exclusive_owner_blocks_nobody_once_its_time_is_up() {
         all.cycle(DurationNs(0));
         assert_eq!(all.rig.unconnected_reply(a).0.outcome(), (0, 0));
         all.rig.events();
+        let (now, mut silence) = (all.rig.now, DurationNs::from_secs(10));
+        if is_heard {
+            all.device.handle_io(now, None, &update[..len]);
+            silence = timeout;
+        }
         // It vanishes without a word: no datagram, no Forward_Close, its stream half open.
-        all.cycle(timeout);
+        all.cycle(silence);
         assert_eq!(all.open(b, 2).outcome(), (1, 0x106), "multiplier {code}: until then it is its");
         all.rig.events();
         all.cycle(DurationNs(1));
         assert_eq!(all.open(b, 2).outcome(), (0, 0), "multiplier {code}: the next cycle, and no later");
-        let timeout_us = timeout.magnitude() / 1000;
-        let lost =
-            Event::MotionLost { triad: triad(1), originator: peer(1), silent_us: timeout_us, timeout_us };
+        let (silent_us, timeout_us) = (silence.magnitude() / 1000, timeout.magnitude() / 1000);
+        let lost = Event::MotionLost { triad: triad(1), originator: peer(1), silent_us, timeout_us };
         assert_eq!(all.rig.events()[0], lost);
         // The first one cannot close what is no longer its.
         assert_eq!(all.rig.ask(a, &close_message(1)).outcome(), (1, 0x107));

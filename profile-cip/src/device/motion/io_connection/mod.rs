@@ -18,6 +18,7 @@ pub(crate) use self::stamps::{Age, Stamps};
 
 use crate::device::axis::report::missed_updates;
 use crate::device::motion_link::OpenParameters;
+use crate::wire::forward_open::FIRST_MESSAGE_TIMEOUT;
 use crate::wire::motion::CommandHeader;
 use crate::wire::motion::codes::{NodeControl, TimeDataSet};
 
@@ -46,7 +47,10 @@ pub(crate) enum Update {
 pub(crate) struct IoConnection {
     pub parameters: OpenParameters,
     sequence: Option<u16>,
+    /// When the owner was heard last; until then, when the connection was opened.
     last_heard: MonotonicTime,
+    /// The owner was heard on this connection.
+    is_heard: bool,
     update_id: Option<u8>,
     /// Arrival of the last update that was applied.
     last_fresh: Option<MonotonicTime>,
@@ -70,6 +74,7 @@ impl IoConnection {
             parameters,
             sequence: None,
             last_heard: now,
+            is_heard: false,
             update_id: None,
             last_fresh: None,
             applied: false,
@@ -107,6 +112,7 @@ impl IoConnection {
     pub fn heard(&mut self, sequence: Option<u16>, now: MonotonicTime) {
         self.sequence = sequence;
         self.last_heard = now;
+        self.is_heard = true;
     }
 
     pub fn update(&self, id: u8) -> Update {
@@ -157,8 +163,14 @@ impl IoConnection {
         now.0.saturating_sub(self.last_heard.0)
     }
 
+    /// Longest silence of the controller, ns. Before its first packet it has longer: nothing moves that could run away.
+    fn timeout(&self) -> u64 {
+        let timeout = self.parameters.timeout_us.saturating_mul(1000);
+        if self.is_heard { timeout } else { timeout.max(FIRST_MESSAGE_TIMEOUT.0.unsigned_abs()) }
+    }
+
     pub fn is_timed_out(&self, now: MonotonicTime) -> bool {
-        self.silence(now) > self.parameters.timeout_us.saturating_mul(1000)
+        self.silence(now) > self.timeout()
     }
 
     pub fn node_control(&self) -> NodeControl {
@@ -186,7 +198,7 @@ impl IoConnection {
 
     /// When the connection has something to do at the latest.
     pub fn wake_at(&self) -> MonotonicTime {
-        let timeout = self.parameters.timeout_us.saturating_mul(1000).saturating_add(1);
+        let timeout = self.timeout().saturating_add(1);
         self.schedule.next().min(MonotonicTime(self.last_heard.0.saturating_add(timeout)))
     }
 }

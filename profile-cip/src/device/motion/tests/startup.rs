@@ -182,6 +182,43 @@ fn close_while_running_stops_and_initializes_without_fault() {
     assert_eq!(rig.device.attribute(0, 461), Ok(&0.0_f32.to_le_bytes()[..]));
 }
 
+/// A controller may need longer to its first update than the time-out of the connection, which is 32 ms here.
+#[test]
+fn first_update_has_ten_seconds() {
+    let mut rig = Rig::new();
+    rig.configure();
+    rig.open();
+    let opened = rig.now;
+    while rig.now <= opened + 10_000_000_000 {
+        assert!(rig.device.connection().is_some(), "{} ns", rig.now - opened);
+        rig.silence();
+        let command = (rig.command(0).action, rig.withheld(0));
+        assert_eq!(command, (DriveAction::None, Some(Withheld::LocalControl)), "nothing moves meanwhile");
+        assert_eq!(rig.state(0), AxisState::Initializing);
+    }
+    rig.run_device();
+    assert_eq!(rig.device.connection(), None);
+    let Some(MotionReply::ConnectionLost { silent_us, .. }) = rig.device.poll_reply() else {
+        panic!("it stays")
+    };
+    assert_eq!(silent_us, (rig.now - opened) / 1_000);
+
+    rig.open();
+    let opened = rig.now;
+    while rig.now < opened + 9_990_000_000 {
+        rig.silence();
+    }
+    let packet = rig.command_packet();
+    rig.send(&packet);
+    let heard = rig.now;
+    while rig.now <= heard + 32_000_000 {
+        assert!(rig.device.connection().is_some(), "{} ns", rig.now - heard);
+        rig.silence();
+    }
+    rig.run_device();
+    assert_eq!(rig.device.connection(), None, "from the first update on the time-out counts");
+}
+
 #[test]
 fn loss_faults_every_axis_and_nothing_starts_again_by_itself() {
     let mut rig = Rig::running();
