@@ -112,6 +112,36 @@ fn what_the_drive_refuses_is_in_the_status_of_the_updates_until_there_is_another
     assert_eq!(held(&rig).0, 1_000);
 }
 
+/// A restarted drive has what it has by itself. It is commissioned anew, and then has what the updates bring.
+#[test]
+fn a_drive_that_has_restarted_has_the_values_of_the_updates_again() {
+    let mut rig = Rig::ready(Settings::without_line(include_str!("can.toml").to_owned()));
+    let held = |rig: &Rig| rig.can[0].bus.nodes().next().expect("a drive").dictionary().number(0x60E0, 0);
+    let by_itself = held(&rig);
+    let turntable = AxisSet::first(1);
+    rig.connect(vec![
+        list(&[(TORQUE_LIMIT, 90.0)]),
+        Step::Enable(turntable),
+        Step::Dwell { seconds: 3.0 },
+        status(OK),
+        Step::FaultReset(turntable),
+        Step::Enable(turntable),
+        Step::Dwell { seconds: 0.2 },
+        status(OK),
+        Step::Disable(turntable),
+    ]);
+    to_step(&mut rig, 1);
+    rig.run_for(millis(200));
+    assert_eq!(held(&rig), 900);
+    assert_ne!(by_itself, 900);
+    let now = rig.now();
+    rig.can[0].bus.nodes_mut().next().expect("a drive").power_cycle(now);
+    assert_eq!(held(&rig), by_itself, "nothing of it is kept");
+    let report = rig.run(millis(20_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+    assert_eq!(held(&rig), 900);
+}
+
 /// A service may set what the list has as well: the updates bring it back.
 #[test]
 fn the_updates_win_against_a_service() {

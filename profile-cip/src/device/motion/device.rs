@@ -291,7 +291,11 @@ impl MotionDevice {
     /// it anew ([`DriveImage::clear`] is where to begin). It is not called without such an axis.
     pub fn update_drive(&mut self, axis: usize, fill: impl FnOnce(&mut DriveImage)) {
         if let Some(slot) = self.engine.instances.slots.get_mut(axis) {
+            let was_online = slot.axis.drive().online;
             slot.axis.update_drive(fill);
+            if slot.axis.drive().online && !was_online {
+                slot.drive_values.renew();
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! What cyclic write data have for the drive: parameters that only its own parameter channel reaches, clause 6-2.7.1.2.3.
 //!
-//! A value is handed to the drive when an update brings another one than the update before, and when something else has set the
-//! attribute since. One access at a time is under way for an attribute; values that come in the meantime replace each other, and the
+//! A value is handed to the drive when an update brings another one than the update before, when something else has set the
+//! attribute since, and when the drive is heard again. One access at a time is under way for an attribute; values that come in the meantime replace each other, and the
 //! last one follows. What the drive refuses is in the status of the write block as long as the updates bring that value.
 
 use arrayvec::ArrayVec;
@@ -62,6 +62,13 @@ impl DriveValues {
     pub fn set_by_others(&mut self, id: u16) {
         for known in self.0.iter_mut().filter(|known| known.id == id) {
             known.is_due = true;
+        }
+    }
+
+    /// The drive is heard again: it may have none of the values any more, and those that came meanwhile were refused.
+    pub fn renew(&mut self) {
+        for known in &mut self.0 {
+            (known.is_due, known.status) = (true, GeneralStatus::SUCCESS);
         }
     }
 
@@ -155,6 +162,27 @@ mod tests {
         assert_eq!(taken(&mut values, &mut tickets), Some((2, 1, vec![1])));
         values.clear();
         assert!(!values.complete(2, GeneralStatus::SUCCESS), "nobody waits for it");
+    }
+
+    #[test]
+    fn a_drive_that_is_heard_again_gets_every_value_again() {
+        let (mut values, mut tickets) = (DriveValues::default(), 0);
+        values.want(1, &[1]).expect("room");
+        values.want(2, &[2]).expect("room");
+        values.want(3, &[3]).expect("room");
+        for ticket in 1..=3 {
+            assert_eq!(taken(&mut values, &mut tickets).map(|(ticket, ..)| ticket), Some(ticket));
+        }
+        assert!(values.complete(1, GeneralStatus::SUCCESS));
+        assert!(values.complete(2, GeneralStatus::DEVICE_STATE_CONFLICT));
+        values.renew();
+        assert_eq!(values.status(), GeneralStatus::SUCCESS, "the drive before refused it");
+        assert_eq!(taken(&mut values, &mut tickets), Some((4, 1, vec![1])));
+        assert_eq!(taken(&mut values, &mut tickets), Some((5, 2, vec![2])));
+        assert_eq!(taken(&mut values, &mut tickets), None, "the drive before has not answered");
+        assert!(values.complete(3, GeneralStatus::DEVICE_STATE_CONFLICT));
+        assert_eq!(taken(&mut values, &mut tickets), Some((6, 3, vec![3])));
+        assert_eq!(values.status(), GeneralStatus::SUCCESS);
     }
 
     #[test]

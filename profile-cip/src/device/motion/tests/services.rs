@@ -380,6 +380,24 @@ fn cyclic_write_data_reach_the_drive_and_its_refusal_the_controller() {
     rig.device.complete_attribute(access.ticket, Ok(&[]));
     send_write(&mut rig, &data(10));
     assert_eq!((write_status(&mut rig), rig.device.poll_attribute_access()), (0, None));
+    // The drive is gone and comes back, as it is after a restart. What comes meanwhile is refused.
+    rig.drives[0].image.online = false;
+    send_write(&mut rig, &data(11));
+    let access = rig.device.poll_attribute_access().expect("another value");
+    rig.device.complete_attribute(access.ticket, Err(GeneralStatus::DEVICE_STATE_CONFLICT));
+    send_write(&mut rig, &data(10));
+    let access = rig.device.poll_attribute_access().expect("the one before");
+    rig.device.complete_attribute(access.ticket, Err(GeneralStatus::DEVICE_STATE_CONFLICT));
+    send_write(&mut rig, &data(10));
+    assert_eq!(rig.device.poll_attribute_access(), None, "it is not asked again while it is gone");
+    assert_eq!(write_status(&mut rig), GeneralStatus::DEVICE_STATE_CONFLICT.0);
+    rig.drives[0].image.online = true;
+    send_write(&mut rig, &data(10));
+    let access = rig.device.poll_attribute_access().expect("the same value again");
+    assert_eq!((access.id, &access.operation), (1316, &wanted(10)));
+    rig.device.complete_attribute(access.ticket, Ok(&[]));
+    send_write(&mut rig, &data(10));
+    assert_eq!((write_status(&mut rig), rig.device.poll_attribute_access()), (0, None));
     // A service sets the attribute to something else: the updates set it back.
     let mut body = [0; 32];
     let mut list = ListWriter::new(&mut body).expect("room");
