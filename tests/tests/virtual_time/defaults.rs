@@ -7,8 +7,9 @@ use axisbridge::mapping::{Access, Mapping, Truth};
 use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{CONTROLLER, Rig, Settings};
-use profile_cip::controller::{AxisSet, Step};
+use profile_cip::controller::{AxisSet, ControllerConfig, Step};
 use profile_cip::device::axis_state::AxisState;
+use profile_generic::inhibit::Inhibits;
 use profile_generic::state::Report;
 use profile_sercos::slave::parameter::Definition;
 use profile_sercos::wire::idn::Idn;
@@ -16,6 +17,8 @@ use profile_sercos::wire::idn::Idn;
 use super::drive_parameters;
 use super::settings::stopped;
 use super::truths::{Bench, GET, OK, SET, another, changed, held, rehearse, truths};
+
+const DEVICE_STATE_CONFLICT: u8 = 0x10;
 
 /// The controller is gone, and another one connects that sets nothing.
 fn reconnect(rig: &mut Rig) {
@@ -115,6 +118,38 @@ fn what_a_controller_has_changed_ends_with_its_connection_also_after_a_silence()
     rig.connect(vec![Step::Dwell { seconds: 100_000.0 }]);
     rig.run_for(millis(5_000));
     assert_eq!(held(&rig), 300, "{}", rig.told());
+}
+
+/// What a drive had goes back when it is heard. Until then a controller configures the other axes, and this one cannot be switched on.
+#[test]
+fn a_drive_that_is_not_heard_keeps_no_other_axis_waiting() {
+    let kpp = Idn::standard(104);
+    let (mut rig, client) = stopped(Rig::ready(Settings::default()));
+    let held = |rig: &Rig, drive: usize| rig.line.slaves()[drive].store().number_of(kpp);
+    for axis in [1, 2] {
+        assert_eq!(client.ask(&mut rig, SET, axis, Some(441), &100.0_f32.to_le_bytes()).0, OK);
+    }
+    assert_eq!((held(&rig, 0), held(&rig, 1)), (600, 600), "300 before");
+    rig.kill_controller();
+    rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
+    rig.line.set_mute(0, true);
+    rig.run_until(millis(100), "the silence", |rig| rig.engine.axes()[0].feedback().report == Report::Silent);
+    assert!(rig.engine.axes()[0].south().is_some(), "it is not commissioned anew");
+    let config = ControllerConfig { late: AxisSet::one(1), ..rig.controller_config() };
+    rig.connect_with(config, vec![Step::Enable(AxisSet::one(2)), Step::Dwell { seconds: 100_000.0 }]);
+    rig.run_until(millis(5_000), "torque", |rig| rig.engine.axes()[1].may_have_torque());
+    assert_eq!((held(&rig, 0), held(&rig, 1)), (600, 300), "{}", rig.told());
+    let client = Client::connect(&mut rig, CONTROLLER);
+    assert_eq!(client.ask(&mut rig, SET, 2, Some(441), &50.0_f32.to_le_bytes()).0, OK);
+    assert_eq!(held(&rig, 1), 300);
+    assert_eq!(client.ask(&mut rig, SET, 1, Some(441), &50.0_f32.to_le_bytes()).0, DEVICE_STATE_CONFLICT);
+    assert!(rig.status().axes[0].inhibits.contains(Inhibits::CONFIGURATION_INCOMPLETE));
+    rig.line.set_mute(0, false);
+    rig.run_for(millis(2_000));
+    assert_eq!(held(&rig, 0), 300, "{}", rig.told());
+    assert!(!rig.status().axes[0].inhibits.contains(Inhibits::CONFIGURATION_INCOMPLETE));
+    assert_eq!(client.ask(&mut rig, SET, 1, Some(441), &100.0_f32.to_le_bytes()).0, OK);
+    assert_eq!(held(&rig, 0), 600);
 }
 
 /// A drive that does not take back what it had keeps what the controller has set, and the log says so.

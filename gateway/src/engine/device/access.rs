@@ -147,6 +147,10 @@ impl Accesses {
         }
         let (request, write) = match &access.operation {
             AccessOperation::Read(_) => (Access::read(held.item), None),
+            // It is not heard, and would take back what it had over this.
+            AccessOperation::Write(_) if self.is_returning() => {
+                return Err(GeneralStatus::DEVICE_STATE_CONFLICT);
+            }
             AccessOperation::Write(bytes) => {
                 let request = on.write(&entry, bytes, parameter, held)?;
                 let write = self.begin_write(access, (bytes, &request), held, &mapping.cip.sequence)?;
@@ -216,6 +220,10 @@ impl Accesses {
     ) -> Result<(), GeneralStatus> {
         let wanted = match &access.operation {
             AccessOperation::Read(_) => None,
+            // As for a value that is not computed.
+            AccessOperation::Write(_) if self.is_returning() => {
+                return Err(GeneralStatus::DEVICE_STATE_CONFLICT);
+            }
             AccessOperation::Write(bytes) => {
                 Some(entry.to_generic(bytes).map_err(|_| GeneralStatus::INVALID_ATTRIBUTE_VALUE)?)
             }

@@ -304,7 +304,9 @@ impl DeviceChannel {
         buses: &mut Buses,
         notice: &mut dyn FnMut(Notice),
     ) {
-        let is_returning = self.members.iter().any(|member| member.accesses.is_returning());
+        // A drive that is not heard is not waited for.
+        let is_returning =
+            self.members.iter().any(|member| member.accesses.is_returning() && axes[member.axis].is_heard());
         for _ in 0..if is_returning { 0 } else { ACCESSES_PER_CYCLE } {
             let Some(access) = self.device.poll_attribute_access() else { break };
             let place = usize::from(access.instance).checked_sub(1);
