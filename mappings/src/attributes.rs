@@ -141,6 +141,27 @@ impl AttributeTable {
         Some(Self { entries: Arc::new(entries) })
     }
 
+    /// An empty table of its own with room for the attributes of these tables.
+    pub(super) fn with_room(tables: &CipTables) -> Self {
+        Self { entries: Arc::new(Vec::with_capacity(tables.attributes.len())) }
+    }
+
+    /// The attributes in another scaling, in place: nothing is allocated in a table of [`AttributeTable::with_room`]. `None`, and
+    /// nothing done, when a ratio does not fit 64 bits, or the table is shared.
+    pub(super) fn refill(&mut self, tables: &CipTables, scaling: &CipScaling) -> Option<()> {
+        let compiled = |row| {
+            let (behind, turns) = behind(tables, row, scaling);
+            entry(row, behind, turns, scaling)
+        };
+        if tables.attributes.iter().any(|row| compiled(row).is_none()) {
+            return None;
+        }
+        let entries = Arc::get_mut(&mut self.entries)?;
+        entries.clear();
+        entries.extend(tables.attributes.iter().filter_map(compiled));
+        Some(())
+    }
+
     /// All attributes.
     pub fn entries(&self) -> &[AttributeEntry] {
         &self.entries

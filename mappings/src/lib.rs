@@ -370,6 +370,17 @@ impl Mapping {
         AttributeTable::compile(&self.cip, scaling)
     }
 
+    /// Room for the attributes of an axis whose scaling changes in operation; empty until [`Mapping::refill_attributes`].
+    pub fn attribute_room(&self) -> AttributeTable {
+        AttributeTable::with_room(&self.cip)
+    }
+
+    /// Makes the attributes in another scaling in a table of [`Mapping::attribute_room`], without allocating. `None`, and nothing done,
+    /// when a ratio of the scaling does not fit 64 bits.
+    pub fn refill_attributes(&self, table: &mut AttributeTable, scaling: &CipScaling) -> Option<()> {
+        table.refill(&self.cip, scaling)
+    }
+
     /// What the device has to know of its attributes, those of the class included. `None` when a ratio of the scaling
     /// does not fit 64 bits.
     pub fn attribute_definitions(&self, scaling: &CipScaling) -> Option<Vec<AttributeDefinition>> {

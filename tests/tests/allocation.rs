@@ -12,7 +12,7 @@ use axisbridge::capture::recorder::{Interfaces, Recorder};
 use axisbridge::config::Config;
 use axisbridge::engine::direct::{DirectNorth, DirectRequest, Direction, Target};
 use axisbridge::engine::notice::Notice;
-use axisbridge::mapping::{Mapping, Object, Told};
+use axisbridge::mapping::{CipProgram, Mapping, Object, Told};
 use axisbridge::recording::{AttributeNames, ContactDevice, DEPTH, Plan, Recording};
 use axisbridge::simulate::drives::linear;
 use axisbridge::status::BoxState;
@@ -26,7 +26,7 @@ use axisbridge_tests::rig::ports::TamperCan;
 use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::assembly::Control;
 use profile_cip::controller::sets::DataSets;
-use profile_cip::controller::{AxisSet, ControllerConfig, Event, Limits, Misbehaviour, Step};
+use profile_cip::controller::{AttributeSet, AxisSet, ControllerConfig, Event, Limits, Misbehaviour, Step};
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::device::drive_link::DriveImage;
 use profile_cip::wire::ConnectionTriad;
@@ -189,6 +189,41 @@ fn neither_a_bad_network_nor_a_start_nor_a_stop_allocates() {
     assert_eq!(weigh(&mut rig, 3_000, |_, _| ()), []);
     assert_eq!(rig.report().failure, None);
     assert!(rig.report().steps_finished >= 2, "{}", rig.log());
+}
+
+/// Taken at an Enable, taken again, and given up with the connection.
+#[test]
+fn scaling_of_the_controller_allocates_nothing() {
+    let mut rig = Rig::ready(Settings::default());
+    let count = |rig: &Rig| rig.engine.devices()[0].program(0).map(CipProgram::count);
+    let resolution = |counts: i32| Step::SetAttributes {
+        axis: 1,
+        attributes: vec![AttributeSet::bytes(78, &counts.to_le_bytes())],
+    };
+    let turntable = AxisSet::one(1);
+    rig.connect(vec![
+        resolution(500_000),
+        Step::Enable(turntable),
+        Step::Disable(turntable),
+        resolution(250_000),
+        Step::Enable(turntable),
+        Step::Disable(turntable),
+        Step::Dwell { seconds: 10.0 },
+    ]);
+    let mut counts = vec![count(&rig)];
+    let found = weigh(&mut rig, 3_000, |rig, _| {
+        if counts.last() != Some(&count(rig)) {
+            counts.push(count(rig));
+        }
+    });
+    assert_eq!(found, []);
+    assert_eq!((rig.report().failure, rig.report().steps_finished), (None, 6), "{}", rig.log());
+    rig.kill_controller();
+    rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
+    rig.connect(vec![Step::Dwell { seconds: 10.0 }]);
+    assert_eq!(weigh(&mut rig, 1_000, |_, _| ()), []);
+    counts.push(count(&rig));
+    assert_eq!(counts, [1_000, 2_000, 4_000, 1_000].map(Some));
 }
 
 #[test]

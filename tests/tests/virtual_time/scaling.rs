@@ -3,7 +3,8 @@
 
 use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, millis};
 use axisbridge_tests::rig::{BOX, Rig, Settings};
-use profile_cip::controller::{AxisSet, ControllerConfig, Limits, Step};
+use profile_cip::controller::{AttributeSet, AxisSet, Condition, ControllerConfig, Limits, Step};
+use profile_cip::wire::motion::codes::{AxisControl, AxisStateCode};
 use profile_generic::fault::FaultCause;
 use profile_generic::state::DriveState;
 use profile_sercos::wire::idn::Idn;
@@ -252,4 +253,36 @@ fn a_command_that_a_modulo_drive_would_take_backward_is_not_sent() {
     });
     assert!(last > 2 * NANO && last < 26 * NANO / 10, "stopped at {last}");
     rig.run_until(millis(3_000), "the end of the torque", |rig| rig.velocity(0).abs() < NANO / 100);
+}
+
+/// The controller can correct a scaling that was refused: the next Enable takes it, or refuses it again, and never waits for ever.
+#[test]
+fn a_scaling_that_was_refused_can_be_corrected() {
+    let mut rig = Rig::ready(Settings::default());
+    let turntable = AxisSet::one(1);
+    let unwind = |counts: i32| Step::SetAttributes {
+        axis: 1,
+        attributes: vec![AttributeSet::usint(83, 1), AttributeSet::bytes(84, &counts.to_le_bytes())],
+    };
+    let refused = || {
+        let state = Condition::State { axis: 1, state: AxisStateCode::MAJOR_FAULTED };
+        let request = AxisControl::ENABLE;
+        let fault = Step::Expect { condition: state, within: millis(500) };
+        [Step::Ask { axes: turntable, request }, fault, Step::FaultReset(turntable)]
+    };
+    let mut program = vec![unwind(0)];
+    program.extend(refused());
+    program.extend(refused());
+    program.extend([
+        unwind(1_000_000),
+        Step::Enable(turntable),
+        Step::MoveAbsolute { axis: 1, position: 0.75, limits: TURNTABLE },
+        Step::Disable(turntable),
+    ]);
+    rig.connect(program);
+    let report = rig.run(millis(20_000));
+    assert_eq!((report.failure, report.steps_finished), (None, 11), "{}\n{}", rig.log(), rig.told());
+    assert!((rig.position(0) - 3 * NANO / 4).abs() < NANO / 500, "at {}", rig.position(0));
+    let refusals = rig.told().matches("attribute 84: expected 2 counts to 2^31 - 1, got 0").count();
+    assert_eq!(refusals, 2, "{}", rig.told());
 }

@@ -65,13 +65,14 @@ impl Member {
     /// An axis as it is configured; `None` if its scaling cannot be expressed exactly. `others` are axes of the same mapping: what is alike is
     /// in memory once.
     pub fn new(config: MemberConfig, mapping: &Mapping, others: &[Self]) -> Option<Self> {
-        let alike = others.iter().map(|other| &other.scaling).find(|other| other.is_used(&config.scaling));
+        let alike =
+            others.iter().map(|other| &other.scaling).find(|other| other.is_configured(&config.scaling));
         Some(Self {
             axis: config.axis,
             cip: CipAxis::new(config.program),
             state: AxisState::Off,
             scaling: match alike {
-                Some(alike) => alike.alike(config.feedback),
+                Some(alike) => alike.alike(mapping, config.feedback),
                 None => Scaling::new(mapping, config.scaling, config.feedback)?,
             },
             stopping: Stopping::new(config.stops),
@@ -209,8 +210,8 @@ impl Member {
         let Some(image) = device.command(place, now) else { return };
         let enabled = image.action == DriveAction::Enable && self.action != DriveAction::Enable;
         self.action = image.action;
-        if enabled && self.scaling.is_taken() {
-            // Scaling attributes may have been set since the configuration was complete.
+        if enabled {
+            // Scaling attributes may have been set since the configuration was complete, or since they were refused.
             self.adopt_scaling(device, place, axis, around, notice);
         }
         if axis.owner() == Owner::Local {

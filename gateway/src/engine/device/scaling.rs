@@ -5,6 +5,7 @@ use profile_cip::device::axis_object::PositionView;
 use profile_cip::device::motion_device::MotionDevice;
 use profile_cip::wire::motion::codes::EventChecking;
 use profile_cip::wire::status::GeneralStatus;
+use profile_generic::scaling::UnitKind;
 
 use super::axis::CipAxis;
 use crate::engine::axis::AxisChannel;
@@ -22,6 +23,9 @@ pub enum ScalingRefusal {
     /// The attributes make no sense.
     #[error(transparent)]
     Attributes(#[from] CipScalingError),
+    /// The unit is one of turns and the axis goes along a line, or the other way round.
+    #[error("Motion Unit, or Feedback Unit with Control Scaling: expected a unit of {}", kind_name(*.0))]
+    Kind(UnitKind),
     /// A ratio does not fit.
     #[error("a ratio of the scaling cannot be expressed exactly")]
     Inexact,
@@ -42,7 +46,10 @@ pub(super) struct Scaling {
     used: CipScaling,
     /// The scaling of the configuration, to which every new connection returns.
     configured: CipScaling,
+    /// The attributes in the scaling of the configuration, shared by axes that are configured alike.
     attributes: AttributeTable,
+    /// The attributes in the scaling of the controller, if that is another one: made in place, because the cycle allocates nothing.
+    own: AttributeTable,
     /// The controller's scaling is known and in use on this connection.
     is_taken: bool,
     /// The device does the scaling, not the controller.
@@ -55,21 +62,29 @@ impl Scaling {
     /// The scaling of the configuration; `None` if it cannot be expressed exactly.
     pub fn new(mapping: &Mapping, configured: CipScaling, feedback: FeedbackUse) -> Option<Self> {
         let attributes = mapping.attribute_table(&configured)?;
-        Some(Self { used: configured, configured, attributes, is_taken: false, by_device: true, feedback })
-    }
-
-    /// Whether this scaling is in use.
-    pub fn is_used(&self, scaling: &CipScaling) -> bool {
-        self.used == *scaling
-    }
-
-    /// The scaling in use as the configuration of another axis, which shares the attributes.
-    pub fn alike(&self, feedback: FeedbackUse) -> Self {
-        let attributes = self.attributes.clone();
-        Self {
-            used: self.used,
-            configured: self.used,
+        Some(Self {
+            used: configured,
+            configured,
             attributes,
+            own: mapping.attribute_room(),
+            is_taken: false,
+            by_device: true,
+            feedback,
+        })
+    }
+
+    /// Whether this is the scaling of the configuration.
+    pub fn is_configured(&self, scaling: &CipScaling) -> bool {
+        self.configured == *scaling
+    }
+
+    /// The scaling of the configuration for another axis, which shares the attributes.
+    pub fn alike(&self, mapping: &Mapping, feedback: FeedbackUse) -> Self {
+        Self {
+            used: self.configured,
+            configured: self.configured,
+            attributes: self.attributes.clone(),
+            own: mapping.attribute_room(),
             is_taken: false,
             by_device: true,
             feedback,
@@ -78,7 +93,7 @@ impl Scaling {
 
     /// The attributes in the scaling that is in use.
     pub fn attributes(&self) -> &AttributeTable {
-        &self.attributes
+        if self.used == self.configured { &self.attributes } else { &self.own }
     }
 
     /// Whether the controller's scaling is known and in use on this connection.
@@ -133,6 +148,10 @@ impl Scaling {
         let number =
             |id| number(if is_of_load && of_encoder(id) { id + FeedbackChannel::Two.offset() } else { id });
         let scaling = CipScaling::from_attributes(&mapping.cip, number)?;
+        // A turn and a millimetre are as many nanounits: nothing downstream would notice.
+        if scaling.kind != self.configured.kind {
+            return Err(ScalingRefusal::Kind(self.configured.kind));
+        }
         self.apply(mapping, axis, scaling)?;
         self.is_taken = true;
         Ok(())
@@ -147,14 +166,25 @@ impl Scaling {
         if scaling == self.used {
             return Ok(());
         }
-        let program = mapping.cip_program(&scaling).ok_or(ScalingRefusal::Inexact)?;
-        let attributes = mapping.attribute_table(&scaling).ok_or(ScalingRefusal::Inexact)?;
-        if !cip.set_program(axis, program) {
+        // Asked first: what is made in place cannot be taken back.
+        if axis.may_have_torque() {
             return Err(ScalingRefusal::Energized);
         }
-        self.attributes = attributes;
+        let program = mapping.cip_program(&scaling).ok_or(ScalingRefusal::Inexact)?;
+        if scaling != self.configured {
+            mapping.refill_attributes(&mut self.own, &scaling).ok_or(ScalingRefusal::Inexact)?;
+        }
+        cip.set_program(axis, program);
         self.used = scaling;
         Ok(())
+    }
+}
+
+/// What an axis of this kind counts.
+const fn kind_name(kind: UnitKind) -> &'static str {
+    match kind {
+        UnitKind::Rotary => "revolutions, as the axis",
+        UnitKind::Linear => "length, as the axis",
     }
 }
 
@@ -228,7 +258,6 @@ mod tests {
     use super::*;
     use crate::engine::axis::Limits;
     use profile_generic::fault::Reaction;
-    use profile_generic::scaling::UnitKind;
     use profile_generic::state::{Report, Request};
     use profile_generic::time::{MonotonicTime, SystemTime};
     use std::collections::BTreeMap;
@@ -275,6 +304,16 @@ mod tests {
         assert!(!scaling.is_taken());
         assert_eq!(take(&mut scaling, &mapping, &OTHER), Ok(()));
         assert_eq!((scaling.used, scaling.is_taken(), scaling.by_device), (OTHER, true, true));
+        // One after the other in the same place, a refused one between them, and the one of the configuration again.
+        let third = CipScaling { counts_per_unit: 360_000, ..CONFIGURED };
+        let none = CipScaling { counts_per_unit: 0, ..CONFIGURED };
+        for (wanted, used) in
+            [(OTHER, OTHER), (none, OTHER), (third, third), (CONFIGURED, CONFIGURED), (third, third)]
+        {
+            let _ = take(&mut scaling, &mapping, &wanted);
+            let expected = mapping.attribute_table(&used).expect("exact");
+            assert_eq!((scaling.used, scaling.attributes().entries()), (used, expected.entries()));
+        }
     }
 
     #[test]
@@ -284,6 +323,48 @@ mod tests {
         let refused = take(&mut scaling, &mapping, &CipScaling { counts_per_unit: 0, ..OTHER });
         assert!(matches!(refused, Err(ScalingRefusal::Attributes(_))), "{refused:?}");
         assert_eq!((scaling.used, scaling.is_taken()), (CONFIGURED, false));
+    }
+
+    /// A turn and a millimetre are as many nanounits.
+    #[test]
+    fn turns_are_refused_on_a_linear_axis_and_lengths_on_a_rotary_one() {
+        let mapping = Mapping::embedded().expect("the shipped tables are sound");
+        let inch = CipScaling { kind: UnitKind::Linear, nanounits_per_unit: 25_400_000_000, ..OTHER };
+        let millimetre = CipScaling { kind: UnitKind::Linear, ..CONFIGURED };
+        for (configured, wanted, refused) in [
+            (millimetre, CONFIGURED, Some(UnitKind::Linear)),
+            (millimetre, CipScaling { counts_per_unit: 4096, ..millimetre }, None),
+            (millimetre, inch, None),
+            (CONFIGURED, millimetre, Some(UnitKind::Rotary)),
+            (CONFIGURED, inch, Some(UnitKind::Rotary)),
+        ] {
+            let mut scaling = Scaling::new(&mapping, configured, FeedbackUse::Motor).expect("exact");
+            let taken = take(&mut scaling, &mapping, &wanted);
+            assert_eq!(taken, refused.map_or(Ok(()), |kind| Err(ScalingRefusal::Kind(kind))), "{wanted:?}");
+            let used = if refused.is_some() { configured } else { wanted };
+            assert_eq!((scaling.used, scaling.is_taken()), (used, refused.is_none()), "{wanted:?}");
+        }
+    }
+
+    /// With Control Scaling the unit of the encoder counts. It is turns until the controller sets it.
+    #[test]
+    fn encoder_in_turns_is_refused_on_a_linear_axis() {
+        let mapping = Mapping::embedded().expect("the shipped tables are sound");
+        let rows = &mapping.cip.scaling;
+        let configured = CipScaling { kind: UnitKind::Linear, ..CONFIGURED };
+        for (unit, expected) in [(0_i64, Err(ScalingRefusal::Kind(UnitKind::Linear))), (1, Ok(()))] {
+            let mut attributes = BTreeMap::from([(rows.configuration, [0; 8])]);
+            attributes.insert(rows.feedback_unit, unit.to_le_bytes());
+            attributes.insert(rows.feedback_resolution[0], 4_000_i64.to_le_bytes());
+            attributes.insert(rows.feedback_resolution[1], 1_i64.to_le_bytes());
+            let get = |id| {
+                attributes.get(&id).map(|value| &value[..]).ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED)
+            };
+            let mut scaling = Scaling::new(&mapping, configured, FeedbackUse::Motor).expect("exact");
+            let mut cip = CipAxis::new(mapping.cip_program(&configured).expect("exact"));
+            let mut axis = AxisChannel::new(Limits::default(), Reaction::HoldPosition, true);
+            assert_eq!(scaling.take(&mapping, (&mut cip, &mut axis), get), expected, "unit {unit}");
+        }
     }
 
     #[test]
