@@ -1,8 +1,9 @@
 //! What cyclic write data have for the drive: parameters that only its own parameter channel reaches, clause 6-2.7.1.2.3.
 //!
 //! A value is handed to the drive when an update brings another one than the update before, when something else has set the
-//! attribute since, and when the drive is heard again. One access at a time is under way for an attribute; values that come in the meantime replace each other, and the
-//! last one follows. What the drive refuses is in the status of the write block as long as the updates bring that value.
+//! attribute since, and when the drive is heard again. One access at a time is under way for an attribute; values that come in
+//! the meantime replace each other, and the last one follows. What the drive refuses is in the status of the write block as long
+//! as the updates bring that value.
 
 use arrayvec::ArrayVec;
 
