@@ -23,7 +23,7 @@ use super::config::{MasterConfig, Ports};
 use super::event::{Event, SlaveId};
 use super::layout::CyclicLayout;
 use super::network::Network;
-use super::station::{Presence, Station};
+use super::station::{Facts, Presence, Station};
 use super::svc::request::SvcFailure;
 use super::topology::{Route, Topology};
 use crate::wire::device_control::Topology as Loop;
@@ -95,8 +95,8 @@ struct Newcomer {
     address: Option<u16>,
     /// Its station.
     slave: Option<usize>,
-    /// What its station was before.
-    before: Option<Presence>,
+    /// What its station was before, and what was known of it: whether it may come may follow from that.
+    before: Option<(Presence, Facts)>,
     /// The application is through, or does not want it.
     proceed: bool,
     turned_away: bool,
@@ -526,7 +526,7 @@ impl Admission {
     fn begin_service(&mut self, net: &mut Network) {
         let Some(index) = self.newcomer.slave else { return };
         let station = &mut net.stations[index];
-        self.newcomer.before = Some(station.presence);
+        self.newcomer.before = Some((station.presence, core::mem::take(&mut station.facts)));
         let address = station.address;
         station.found(address, net.config.slave(address));
         station.presence = Presence::Joining;
@@ -592,8 +592,8 @@ impl Admission {
         let Some(index) = self.newcomer.slave.take() else { return };
         let station = &mut net.stations[index];
         // Before the service channel took over nothing of it has changed.
-        let Some(before) = self.newcomer.before.take() else { return };
-        station.presence = before;
+        let Some((presence, facts)) = self.newcomer.before.take() else { return };
+        (station.presence, station.facts) = (presence, facts);
         station.channel.abort(SvcFailure::SlaveLost);
         station.channel.set_open(false);
         net.stations.count_anew();

@@ -300,6 +300,28 @@ fn a_tail_that_was_cut_off_comes_back() {
     }
 }
 
+/// The class that lets a slave come in is its own: an attempt that fails before it was read again does not take it away.
+#[test]
+fn a_slave_whose_way_in_has_failed_is_let_in_later_without_a_place_in_the_configuration() {
+    let mut out = Vec::new();
+    for cycles in 0..60 {
+        let mut rig = line(&[1, 2, 3], &[]);
+        rig.network.cut(2);
+        rig.cycles(20);
+        rig.network.mend(2);
+        rig.cycles(cycles);
+        rig.network.cut(2);
+        rig.cycles(60);
+        rig.network.mend(2);
+        rig.forget();
+        rig.cycles(1_500);
+        if !plugged(3)(&rig) {
+            out.push(cycles);
+        }
+    }
+    assert_eq!(out, [0; 0]);
+}
+
 #[test]
 fn a_tail_without_hot_plug_stays_out_and_is_named() {
     let network = Network::line((1..=4).map(mirror).collect());
