@@ -52,6 +52,8 @@ impl Network {
         search: &Isolation,
     ) {
         let phase = self.stations.phase;
+        // It is that of this cycle, also where it is not sent.
+        let now = self.time.now.take();
         let header = PhaseField::new(switching.is_some(), self.cycle_count, switching.unwrap_or(phase));
         self.frames.begin(header);
         match phase {
@@ -63,7 +65,7 @@ impl Network {
             }
             _ => {
                 let used = self.config.system_time && switching.is_none();
-                let extended = used.then(|| self.time.field(self.cycle_count));
+                let extended = used.then(|| self.time.field(now, self.cycle_count));
                 let lengths = [self.layout.mdt_len, self.layout.at_len].map(|len| len.map(usize::from));
                 self.build_telegrams(lengths, extended, hot_plug, search);
             }
@@ -156,8 +158,7 @@ impl TimeField {
     /// The extended field with the fragment of the system time that belongs to this cycle: seconds and nanoseconds
     /// in four halves, each sent in two cycles, latched for all eight. Without a time for the first of them all eight say that there
     /// is none.
-    fn field(&mut self, cycle_count: u8) -> Extended {
-        let now = self.now.take();
+    fn field(&mut self, now: Option<SystemTime>, cycle_count: u8) -> Extended {
         if cycle_count == 0 {
             self.latched = now;
             self.toggle ^= now.is_some();
@@ -221,8 +222,8 @@ mod tests {
             let mut fields = Vec::new();
             for cycle in 0..8 {
                 // Those of the later cycles do not count.
-                time.now = if cycle == 0 { first.map(SystemTime) } else { Some(SystemTime(1)) };
-                fields.push(time.field(cycle));
+                let now = if cycle == 0 { first.map(SystemTime) } else { Some(SystemTime(1)) };
+                fields.push(time.field(now, cycle));
             }
             assert!(fields.iter().all(|field| field.word == fields[0].word));
             let halves: Vec<_> = fields.iter().map(|field| field.time_fragment).collect();

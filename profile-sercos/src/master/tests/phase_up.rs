@@ -364,6 +364,34 @@ fn a_soft_master_says_so() {
     assert_eq!(words[0], words[7]);
 }
 
+/// A system time belongs to the cycle that it was set for: one that this cycle did not send is not sent in a later one.
+#[test]
+fn a_system_time_of_a_cycle_without_the_field_is_not_sent_later() {
+    let mut sent = Vec::new();
+    // Every eighth cycle begins a time: the first one of CP3 may be one of those.
+    for more in 0..8 {
+        let mut rig = Rig::with(MasterConfig { system_time: true, ..config(&[1]) }, &[1]);
+        rig.up_to(Phase::CP4);
+        rig.master.set_target_phase(Phase::CP0);
+        rig.master.set_system_time(Some(profile_generic::time::SystemTime(1_000_000_000)));
+        rig.run_until("in CP0", |rig| rig.master.state() == State::Cp0);
+        (0..more).for_each(|_| rig.step());
+        let valid = std::rc::Rc::new(std::cell::Cell::new(0));
+        let count = std::rc::Rc::clone(&valid);
+        rig.outward = Box::new(move |frame| {
+            // MDT0 of CP3, and the word of its extended field.
+            let word = u16::from_le_bytes([frame[HEADER_LEN + 8], frame[HEADER_LEN + 9]]);
+            let in_cp3 = frame[14] & 0x4F == 0 && frame[15] & 0x0F == 3;
+            count.set(count.get() + u32::from(in_cp3 && word & 1 << 14 != 0));
+            true
+        });
+        rig.master.set_target_phase(Phase::CP4);
+        rig.run_until("in CP4", |rig| rig.master.state() == State::Cp4);
+        sent.push(valid.get());
+    }
+    assert_eq!(sent, [0; 8]);
+}
+
 #[test]
 fn four_telegrams_for_many_slaves() {
     let config = MasterConfig { slaves_max: 300, setup_cycle_ns: 2_000_000, ..config(&[]) };
