@@ -586,9 +586,9 @@ fn hand_on(
     }
 }
 
-/// Somebody besides a controller has written to a drive: a write has no data in its answer.
+/// Somebody besides a controller may have written to a drive.
 fn note_set(devices: &mut [DeviceChannel], axis: usize, answer: &Answer) {
-    if answer.result.as_ref().is_ok_and(|(data, _)| data.is_empty()) {
+    if answer.write && answer.result.is_ok() {
         devices.iter_mut().for_each(|device| device.set_by_others(axis, answer.item));
     }
 }

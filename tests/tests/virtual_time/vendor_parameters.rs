@@ -260,6 +260,58 @@ fn a_vendors_parameter_is_read_and_written_as_a_register_while_nobody_has_the_ax
     assert_eq!(held(&rig), 2_500);
 }
 
+/// Ends the connection of the controller.
+fn disconnect(rig: &mut Rig) {
+    rig.kill_controller();
+    rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
+}
+
+/// What a person has set while no controller was connected is not taken back for what the drive had before a controller changed it.
+#[test]
+fn what_was_written_by_name_or_as_a_register_stays_when_a_controller_connects() {
+    let can = Settings::without_line(include_str!("can.toml"));
+    let mut seen = Vec::new();
+    for (bus, settings) in [("SERCOS", Settings::default()), ("CANopen", can)] {
+        for by_register in [false, true] {
+            let mut rig = Rig::new(Settings { overlays: vec![OVERLAY], ..settings.clone() });
+            if bus == "SERCOS" {
+                let notch = Definition::value(idn(), NOTCH_WRITABLE, "Notch filter frequency", 1_200);
+                rig.line.slaves_mut()[0].store_mut().define(notch.unit("Hz").range(600, 30_000));
+            } else {
+                let mut notch = dictionary::Definition::new("Notch filter frequency", DataType::U16, 120);
+                (notch.low, notch.high) = (60, 1_500);
+                let node = rig.can[0].bus.nodes_mut().next().expect("a device");
+                node.dictionary_mut().add(Mux::new(0x2051, 0), notch);
+            }
+            let (local, mut names) = LocalNorth::new(rig.engine.axes().len());
+            rig.engine.set_local(local);
+            let (registers, mut numbers) = RegisterNorth::new();
+            rig.engine.set_registers(registers);
+            let (mut rig, client) = reached(rig);
+            assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(333.0)), OK);
+            disconnect(&mut rig);
+            if by_register {
+                assert_eq!(register(&mut rig, &mut numbers, Some(250_000)), Ok(250_000));
+            } else {
+                assert_eq!(access(&mut rig, &mut names, (1, 0), Some(250_000)), Ok(Some(250_000)));
+            }
+            rig.connect(vec![Step::Dwell { seconds: 1_000.0 }]);
+            rig.run_for(millis(5_000));
+            seen.push((bus, by_register, access(&mut rig, &mut names, (1, 0), None)));
+            // What a controller changes from then on ends with its connection.
+            let client = Client::connect(&mut rig, CONTROLLER);
+            assert_eq!(client.ask(&mut rig, SET, 1, NOTCH, &hertz(333.0)), OK);
+            disconnect(&mut rig);
+            rig.connect(vec![Step::Dwell { seconds: 1_000.0 }]);
+            rig.run_for(millis(5_000));
+            seen.push((bus, by_register, access(&mut rig, &mut names, (1, 0), None)));
+        }
+    }
+    let kept = |bus, by_register| [(bus, by_register, Ok(Some(250_000))); 2];
+    let expected = [("SERCOS", false), ("SERCOS", true), ("CANopen", false), ("CANopen", true)];
+    assert_eq!(seen, expected.map(|(bus, by_register)| kept(bus, by_register)).concat());
+}
+
 /// The same parameter where drives have it as floating point numbers of 32 bits.
 fn in_real32() -> &'static str {
     let sercos = ("length = 2\nformat = \"unsigned\"\ndecimals = 1", "length = 4\nformat = \"float\"");

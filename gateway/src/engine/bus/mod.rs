@@ -87,7 +87,9 @@ pub struct Answer {
     pub purpose: Purpose,
     /// What was accessed.
     pub item: Item,
-    /// The data read and the progress of a command, or why it failed.
+    /// Whether a value was written.
+    pub write: bool,
+    /// The data and the progress of a command, or why it failed.
     pub result: Result<(Data, Progress), AccessFailure>,
     /// How the drive itself has said why it failed, as far as it has said anything.
     pub said: Option<DirectFailure>,

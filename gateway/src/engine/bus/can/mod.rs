@@ -30,7 +30,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use self::commissioner::{AxisSetup, DeviceWork, Made, Order, WINDOW};
 use self::layout::{BYTES_MAX, PDOS_MAX, PdoMap};
 use self::lss::{Assigner, Assignment};
-use super::accesses::Accesses;
+use super::accesses::{Accesses, Asked};
 use super::backoff::Backoff;
 use super::can_link::{CanLink, PATIENCE, Station};
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
@@ -42,7 +42,7 @@ use crate::engine::cyclic::Received;
 use crate::engine::direct::{DirectFailure, DirectResult, DirectTask, NotBegun};
 use crate::engine::notice::Notice;
 use crate::engine::port::SouthPort;
-use crate::mapping::{DriveIdentity, Item, Mapping};
+use crate::mapping::{DriveIdentity, Mapping};
 use crate::status::{BusDetail, NodeStatus};
 
 /// Axes of one device.
@@ -430,10 +430,9 @@ impl CanBus {
                 return;
             }
             for drive in &mut device.drives {
-                if let Some((purpose, _)) = drive.accesses.take(ticket) {
-                    let item = Item::object(outcome.object.index, outcome.object.sub);
-                    let said = outcome.result.err().map(DirectFailure::Sdo);
-                    answer(axes, Answer { axis: drive.axis, purpose, item, result: reply(&outcome), said });
+                if let Some(Asked { purpose, item, write }) = drive.accesses.take(ticket) {
+                    let (result, said) = (reply(&outcome), outcome.result.err().map(DirectFailure::Sdo));
+                    answer(axes, Answer { axis: drive.axis, purpose, item, write, result, said });
                     return;
                 }
             }
@@ -627,7 +626,7 @@ impl South for CanBus {
         let drive = &mut device.drives[drive];
         let priority = if access.urgent { Priority::Urgent } else { Priority::Normal };
         let node = device.node;
-        drive.accesses.submit(access.item, purpose, || master.sdo_submit(node, request, priority).ok())
+        drive.accesses.submit(access, purpose, || master.sdo_submit(node, request, priority).ok())
     }
 
     fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {

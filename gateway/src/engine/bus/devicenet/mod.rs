@@ -28,7 +28,7 @@ use self::commissioner::ListWork;
 use self::direct::DirectAccess;
 use self::end::{End, MessageError, Row};
 use self::setup::{SetupFailure, SetupStep};
-use super::accesses::Accesses;
+use super::accesses::{Accesses, Asked};
 use super::backoff::Backoff;
 use super::can_link::{CanLink, PATIENCE, Station};
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
@@ -293,11 +293,11 @@ impl DevicenetBus {
                 }
                 return;
             }
-            if let Some((purpose, item)) = drive.accesses.take(ticket) {
-                let result = reply(item, purpose, outcome);
+            if let Some(Asked { purpose, item, write }) = drive.accesses.take(ticket) {
+                let result = reply(item, write, outcome);
                 let said = result.as_ref().err().and_then(|_| access::refused_with(outcome));
                 let said = said.map(DirectFailure::Cip);
-                answer(axes, Answer { axis, purpose, item, result, said });
+                answer(axes, Answer { axis, purpose, item, write, result, said });
                 return;
             }
         }
@@ -427,13 +427,13 @@ fn told(axis: usize, mac: MacId, failure: SetupFailure) -> Notice {
 /// What an access came to.
 fn reply(
     item: Item,
-    purpose: Purpose,
+    write: bool,
     outcome: &Outcome,
 ) -> Result<(Data, Progress), crate::engine::access::AccessFailure> {
     let Item::Attribute(attribute) = item else {
         return Err(crate::engine::access::AccessFailure::Unanswered);
     };
-    if matches!(purpose, Purpose::Attribute { write: true, .. } | Purpose::Original { write: true, .. }) {
+    if write {
         access::written(attribute, outcome)?;
         return Ok((Data::new(), Progress::None));
     }
@@ -606,7 +606,7 @@ impl South for DevicenetBus {
             return false;
         }
         let mac = drive.plan.mac;
-        drive.accesses.submit(access.item, purpose, || master.submit(mac, request).ok())
+        drive.accesses.submit(access, purpose, || master.submit(mac, request).ok())
     }
 
     fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {

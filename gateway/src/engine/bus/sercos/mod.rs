@@ -30,7 +30,7 @@ use profile_sercos::wire::scp::ScpClass;
 use self::commissioner::{DriveSetup, DriveWork, Made, Order, Progress as SetupProgress, Setup};
 use self::progress::PhaseProgress;
 use self::recovery::{Missing, Recovery};
-use super::accesses::Accesses;
+use super::accesses::{Accesses, Asked};
 use super::commissioner::{CommissionerHandle, Done, Job, Run};
 use super::direct_slot::DirectSlot;
 use super::{Answer, Counts, Places, Purpose, Sent, South, ask};
@@ -599,13 +599,12 @@ impl SercosBus {
         if drive.setup.handle(ticket, &outcome) {
             return;
         }
-        let Some((purpose, _)) = drive.accesses.take(ticket) else {
+        let Some(Asked { purpose, item, write }) = drive.accesses.take(ticket) else {
             self.commissioner.push(Job::Spent(outcome));
             return;
         };
-        let (item, result) = (outcome.idn.into(), reply(&outcome));
         let said = outcome.result.err().map(DirectFailure::Svc);
-        answer(axes, Answer { axis: drive.axis, purpose, item, result, said });
+        answer(axes, Answer { axis: drive.axis, purpose, item, write, result: reply(&outcome), said });
     }
 }
 
@@ -750,7 +749,7 @@ impl South for SercosBus {
         let Self { master, drives, .. } = self;
         let drive = &mut drives[place];
         let Some(slave) = drive.present_slave() else { return false };
-        drive.accesses.submit(access.item, purpose, || master.svc_submit(slave, request).ok())
+        drive.accesses.submit(access, purpose, || master.svc_submit(slave, request).ok())
     }
 
     fn begin_direct(&mut self, axis: usize, task: DirectTask) -> Result<(), NotBegun> {
