@@ -76,9 +76,9 @@ impl South for SercosSouth {
 
     fn exchange(&mut self, now: MonotonicTime, cable: bool) {
         self.line.handle_time(now);
-        while let Some((mut frame, ())) = self.queue.outbound.pop() {
+        while let Some((mut frame, port)) = self.queue.outbound.pop() {
             if cable && self.line.round_trip(now, frame.as_mut_slice()) {
-                self.queue.inbound.push(frame.as_slice(), ());
+                self.queue.inbound.push(frame.as_slice(), port);
             }
         }
     }

@@ -62,6 +62,7 @@ use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 use profile_generic::time_base::TimeSample;
 use profile_sercos::checker::bus::Stations;
 use profile_sercos::checker::checked_bus::{CheckedBus, Tried};
+use profile_sercos::port::Port;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::wire::drive_words::DriveControl;
 use profile_sercos::wire::idn::Idn;
@@ -637,7 +638,7 @@ impl Rig {
     /// # Panics
     /// When there is no room for it.
     pub fn inject_frame(&mut self, frame: &[u8]) {
-        assert!(self.south.inbound.push(frame, ()), "no room for another frame");
+        assert!(self.south.inbound.push(frame, Port::One), "no room for another frame");
     }
 
     /// Datagrams that the network lost, doubled and held back: commands, then actual values.

@@ -168,13 +168,13 @@ impl NorthPort for NorthQueue {
     }
 }
 
-/// The Ethernet port of the SERCOS master.
+/// The Ethernet ports of the SERCOS master; the second one is used where the configuration has one.
 #[derive(Debug, Default)]
 pub struct SouthQueue {
     /// What comes back from the line.
-    pub inbound: Ring<()>,
+    pub inbound: Ring<Port>,
     /// What the master has sent.
-    pub outbound: Ring<()>,
+    pub outbound: Ring<Port>,
     /// When it has begun to send last: that of the MST.
     pub sent_at: Option<MonotonicTime>,
     /// Frames are handed over with their instant, as to a port that holds them until then.
@@ -196,19 +196,19 @@ impl SouthQueue {
         mut line: Option<&mut dyn Stations>,
         back: &mut dyn FnMut(&mut Bytes) -> bool,
     ) {
-        while let Some((mut frame, ())) = self.outbound.pop() {
+        while let Some((mut frame, port)) = self.outbound.pop() {
             let Some(line) = line.as_deref_mut() else {
-                checked.sent(now, Port::One, frame.as_slice());
+                checked.sent(now, port, frame.as_slice());
                 continue;
             };
             let inbound = &mut self.inbound;
             let mut arrived = |port, frame: &mut [u8]| {
                 let mut frame = Bytes::of(frame);
-                if port == Port::One && back(&mut frame) {
-                    inbound.push(frame.as_slice(), ());
+                if back(&mut frame) {
+                    inbound.push(frame.as_slice(), port);
                 }
             };
-            checked.send(now, Port::One, frame.as_mut_slice(), line, &mut |_, _, _| {}, &mut arrived);
+            checked.send(now, port, frame.as_mut_slice(), line, &mut |_, _, _| {}, &mut arrived);
         }
         checked.judge();
     }
@@ -216,11 +216,11 @@ impl SouthQueue {
 
 impl EthernetPort for SouthQueue {
     fn receive(&mut self, buffer: &mut [u8]) -> Option<(Port, usize)> {
-        let (len, ()) = self.inbound.pop_into(buffer)?;
+        let (len, port) = self.inbound.pop_into(buffer)?;
         if let Some(tap) = &mut self.tap {
-            tap.frame(KernelTime(0), Side::South(Port::One), &buffer[..len]);
+            tap.frame(KernelTime(0), Side::South(port), &buffer[..len]);
         }
-        Some((Port::One, len))
+        Some((port, len))
     }
 
     fn send(&mut self, at: MonotonicTime, port: Port, frame: &[u8]) -> bool {
@@ -228,7 +228,7 @@ impl EthernetPort for SouthQueue {
         if let Some(tap) = &mut self.tap {
             tap.frame(realtime_now(), Side::South(port), frame);
         }
-        port == Port::One && self.outbound.push(frame, ())
+        self.outbound.push(frame, port)
     }
 
     fn holds_frames(&self) -> bool {
