@@ -2,8 +2,9 @@
 
 use axisbridge::engine::notice::Notice;
 use axisbridge::simulate::drives::linear;
+use axisbridge_tests::rig::explicit::Client;
 use axisbridge_tests::rig::motion::{NANO, SLIDE, TURNTABLE, at_rest, millis};
-use axisbridge_tests::rig::{BOX, Rig, Settings};
+use axisbridge_tests::rig::{BOX, CONTROLLER, Rig, Settings};
 use profile_cip::controller::{AxisSet, Condition, ControllerConfig, Step};
 use profile_cip::device::axis_state::AxisState;
 use profile_cip::wire::motion::codes::AxisStateCode;
@@ -14,6 +15,8 @@ use profile_sercos::master::event::{Event, HotPlugRefusal};
 use profile_sercos::slave::communication::CLASSES_WITH_HOT_PLUG;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::{Config as SlaveConfig, Slave};
+use profile_sercos::wire::header::HEADER_LEN;
+use profile_sercos::wire::idn::Idn;
 
 /// A slide with SCP_HP.
 fn slide(address: u16) -> Slave<Drive> {
@@ -129,4 +132,74 @@ fn a_drive_that_does_not_belong_there_is_told_of_and_stays_out() {
     assert_eq!(told, 1, "{}", rig.told());
     assert_eq!(rig.engine.axes()[1].state(), DriveState::NotReady);
     assert_eq!(rig.status().phase, 4);
+}
+
+/// Connects a controller that only reads and sets attributes.
+fn look_on(rig: &mut Rig) {
+    rig.connect(vec![Step::Dwell { seconds: 100_000.0 }]);
+    rig.run_until(millis(20_000), "Stopped", |rig| {
+        rig.engine.devices()[0].axis_states().all(|(_, state)| state == AxisState::Stopped)
+    });
+}
+
+/// Another drive with the same address takes the place of the one whose attribute a controller has set: it keeps what it came with.
+#[test]
+fn a_drive_that_takes_the_place_of_another_one_keeps_its_own_values() {
+    const SET: u8 = 0x10;
+    let kpp = Idn::standard(104);
+    let held = |rig: &Rig| rig.line.slaves()[1].store().number_of(kpp);
+    let mut rig = Rig::ready(settings());
+    plug(&mut rig, slide(2));
+    rig.run_until(millis(9_000), "the drive", plugged);
+    look_on(&mut rig);
+    let client = Client::connect(&mut rig, CONTROLLER);
+    assert_eq!(client.ask(&mut rig, SET, 2, Some(441), &100.0_f32.to_le_bytes()).0, 0);
+    assert_eq!(held(&rig), 600, "300 before");
+    rig.line.cut(1);
+    rig.run_for(millis(200));
+    let mut other = slide(2);
+    let handle = other.store().find(kpp).expect("the drive has it");
+    other.store_mut().set_number(handle, 450);
+    rig.line.set_power(1, false);
+    rig.line.slaves_mut()[1] = other;
+    rig.line.set_power(1, true);
+    rig.notices.clear();
+    rig.line.mend(1);
+    rig.run_until(millis(9_000), "the other drive", plugged);
+    rig.run_for(millis(500));
+    rig.kill_controller();
+    rig.run_until(millis(5_000), "the connection is lost", |rig| rig.status().connections == 0);
+    look_on(&mut rig);
+    assert_eq!(held(&rig), 450, "{}", rig.told());
+}
+
+/// A drive that fails again and again in the last step of its setup, and for the same reason.
+#[test]
+fn a_drive_that_is_refused_twice_for_the_same_reason_is_given_up_both_times() {
+    let mut rig = Rig::ready(settings());
+    plug(&mut rig, slide(2));
+    let has_program = |rig: &Rig| rig.engine.axes()[1].south().is_some();
+    let mut left = Vec::new();
+    for attempt in ["the first attempt", "the second attempt"] {
+        rig.run_until(millis(20_000), attempt, has_program);
+        // Its service channel is silent from now on.
+        let places = rig.sercos().master().layout().slaves[1].clone().expect("its places");
+        rig.tamper_frame = Some(Box::new(move |frame| {
+            let bytes = frame.as_mut_slice();
+            if bytes[14] & 0x40 != 0 && bytes[15] & 0x8F == 4 && places.svc_at.telegram == bytes[14] & 0x0F {
+                bytes[HEADER_LEN..][places.svc_at.range(6)].fill(0);
+            }
+            true
+        }));
+        rig.run_for(millis(1_000));
+        left.push(has_program(&rig));
+        rig.tamper_frame = None;
+    }
+    assert_eq!(left, [false, false], "{}", rig.told());
+    let refused = Event::HotPlugRefused { address: Some(2), reason: HotPlugRefusal::SetUp };
+    let told = rig.notices.iter().filter(|notice| **notice == Notice::Sercos(refused.clone())).count();
+    assert_eq!(told, 1, "the same is reported once: {}", rig.told());
+    rig.run_until(millis(20_000), "the third attempt", plugged);
+    rig.run_for(millis(100));
+    assert_eq!(rig.engine.axes()[1].state(), rig.engine.axes()[0].state());
 }

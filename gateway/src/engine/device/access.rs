@@ -41,6 +41,8 @@ pub(super) struct Accesses {
     computed: ParameterJobs<Computed>,
     /// What the drive had before a controller changed it.
     originals: Originals,
+    /// The programs of the axis at the last look.
+    programs: u64,
     /// What the computed values of cyclic lists need.
     pub cyclic: CyclicValues,
 }
@@ -158,6 +160,7 @@ impl Accesses {
             }
         };
         let (number, purpose) = (on.axis_number, on.original(false));
+        self.follow_program(on.axis);
         if !self.originals.ask_before(&request, |before| buses.access(number, before, purpose)) {
             return Err(on.unasked());
         }
@@ -294,11 +297,17 @@ impl Accesses {
         self.originals.forget(item);
     }
 
-    fn give_back(&mut self, on: &Accessed<'_>, buses: &mut Buses) {
-        if on.axis.south().is_none() {
-            // It is commissioned anew. One that is not heard for a moment has what it had.
+    /// A drive with another program was commissioned anew, and may be another one. One that is not heard for a moment has what it had.
+    fn follow_program(&mut self, axis: &AxisChannel) {
+        let programs = axis.programs();
+        if std::mem::replace(&mut self.programs, programs) != programs {
             self.originals.forget_all();
-        } else if !on.is_gone() && !on.axis.may_have_torque() {
+        }
+    }
+
+    fn give_back(&mut self, on: &Accessed<'_>, buses: &mut Buses) {
+        self.follow_program(on.axis);
+        if !on.is_gone() && !on.axis.may_have_torque() {
             let (number, purpose) = (on.axis_number, on.original(true));
             self.originals.advance(|request| buses.access(number, request, purpose));
         }
