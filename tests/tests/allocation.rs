@@ -49,6 +49,7 @@ use profile_generic::state::Action;
 use profile_generic::time::DurationNs;
 use profile_sercos::master::event::Event as SercosEvent;
 use profile_sercos::port::Port;
+use profile_sercos::slave::communication::CLASSES_WITH_HOT_PLUG;
 use profile_sercos::slave::drive::Drive;
 use profile_sercos::slave::{Config as SlaveConfig, Slave};
 use profile_sercos::wire::idn::Idn;
@@ -263,6 +264,41 @@ fn a_drive_that_is_plugged_in_while_another_axis_moves_allocates_nothing() {
     assert_eq!(rig.notices.iter().filter(came).count(), 2, "{}", rig.told());
     assert_eq!(found, []);
     assert_eq!(rig.report().failure, None);
+}
+
+/// The answers to what it was asked have buffers, which the commissioner frees.
+#[test]
+fn a_drive_that_goes_again_on_its_way_in_frees_nothing_in_the_cycle() {
+    let mut rig = Rig::ready(Settings {
+        configuration: BOX.replace("address = 2", "address = 2\nhot_plug = true"),
+        drives: vec![(1, UnitKind::Rotary)],
+        ..Settings::default()
+    });
+    let config = SlaveConfig { address: 2, classes: CLASSES_WITH_HOT_PLUG, ..SlaveConfig::default() };
+    rig.line.append(Slave::new(&config, Drive::new(linear()).expect("the servo works")));
+    let mut found = Vec::new();
+    let mut refused = 0;
+    for cycles in (100..400).step_by(25) {
+        rig.line.mend(1);
+        for number in 0..cycles + 100 {
+            if number == cycles {
+                rig.line.cut(1);
+            }
+            for _ in 0..CALLS {
+                let info = rig.cycle_in(|cycle| measure(cycle));
+                if (info.count_total, info.count_current) != (0, 0) {
+                    found.push((cycles, number, info.count_total, info.count_current));
+                }
+            }
+        }
+        let is_refusal = |notice: &&Notice| {
+            matches!(notice, Notice::Sercos(SercosEvent::HotPlugRefused { address: Some(2), .. }))
+        };
+        refused += rig.notices.iter().filter(is_refusal).count();
+        rig.notices.clear();
+    }
+    assert!(refused > 3, "{refused}");
+    assert_eq!(found, []);
 }
 
 #[test]

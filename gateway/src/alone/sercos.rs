@@ -6,6 +6,7 @@ use profile_generic::time::MonotonicTime;
 use profile_sercos::master::Master;
 use profile_sercos::master::config::{AddressPolicy, ConfigError, MasterConfig};
 use profile_sercos::master::event::{Event, Output, SlaveId, Ticket};
+use profile_sercos::master::station::Presence;
 use profile_sercos::wire::header::Phase;
 
 use super::{Line, Stage};
@@ -43,9 +44,11 @@ impl SercosLine {
     fn note(&mut self, event: Event) -> Result<(), String> {
         match event {
             Event::AwaitingApplication { phase } if phase == Phase::CP2 && self.stage == Stage::Starting => {
-                self.slave = self.master.slave_by_address(self.address);
+                // One that was lost since the scan is not waited for.
+                let active = || self.master.slaves().filter(|slave| slave.presence == Presence::Active);
+                self.slave = active().find(|slave| slave.address == self.address).map(|slave| slave.id);
                 if self.slave.is_none() {
-                    let there = self.master.slaves().map(|slave| slave.address.to_string());
+                    let there = active().map(|slave| slave.address.to_string());
                     let there = there.collect::<Vec<_>>().join(", ");
                     return Err(format!(
                         "no drive has the SERCOS address {}: those on the line have {there}",

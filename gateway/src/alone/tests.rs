@@ -125,6 +125,31 @@ fn a_drive_takes_in_cp2_what_it_protects_in_operation_and_keeps_it() {
     assert!(list.contains("parameter S-0-0104 name=") && list.ends_with("source=S-0-0192\n"), "{list}");
 }
 
+/// One that was found by the scan and goes on the way to CP2 is not waited for.
+#[test]
+fn a_drive_that_is_lost_before_cp2_is_not_asked() {
+    let line = line();
+    let config = MasterConfig { stable_cycles: 10, ..MasterConfig::new(SIMULATED_MAC, 2_000_000) };
+    let mut master = SercosLine::new(config, Box::new(line.clone()), 3).unwrap();
+    let mut wait = wait(BEGIN);
+    let mut ended = None;
+    for _ in 0..5_000 {
+        let now = wait(master.wake_at());
+        match master.step(now) {
+            Ok(Stage::Starting) => {}
+            other => {
+                ended = Some(other);
+                break;
+            }
+        }
+        if line.0.borrow().highest >= Some(Phase::CP1) {
+            line.0.borrow_mut().network.cut(1);
+        }
+    }
+    let why = "no drive has the SERCOS address 3: those on the line have 7".to_owned();
+    assert_eq!(ended, Some(Err(why)));
+}
+
 #[test]
 fn refusals_are_those_of_the_drive_and_of_the_gateway() {
     let line = line();

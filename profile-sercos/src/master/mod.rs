@@ -317,6 +317,12 @@ impl Master {
         self.slaves().find(|slave| slave.address == address).map(|slave| slave.id)
     }
 
+    /// Whether telegrams get past a slave to others that are heard, in a closed ring or on a line. Hot plug brings no slave in there.
+    #[must_use]
+    pub fn is_passed(&self, slave: SlaveId) -> bool {
+        self.net.is_passed(slave.index())
+    }
+
     /// Replaces the connections of a slave. Possible while the master awaits the application in CP2, or for this slave
     /// in [`Event::HotPlugAwaits`] of CP2.
     pub fn set_connections(&mut self, slave: SlaveId, connections: Connections) -> Result<(), CallError> {

@@ -67,6 +67,19 @@ impl Network {
         self.redundancy.cable(cable, &self.stations)
     }
 
+    /// Whether telegrams get past a slave to others: all the way round a ring, or to an active one behind it on its line.
+    pub fn is_passed(&self, index: usize) -> bool {
+        let Some(position) = self.redundancy.position(index) else { return false };
+        let is_behind = |(other, station): (usize, &Station)| {
+            let on = |route: Route| station.link.valid_routes & 1 << route.index() != 0;
+            station.is_active()
+                && self.redundancy.position(other).is_some_and(|other| {
+                    on(Route::PRIMARY_ONE) && other > position || on(Route::SECONDARY_TWO) && other < position
+                })
+        };
+        self.redundancy.topology().is_ring() || self.stations.iter().enumerate().any(is_behind)
+    }
+
     /// Whether the ATs that have come back have the data of every slave.
     pub fn is_complete(&mut self, scanned: &[Route]) -> bool {
         let back = |route: &Route| self.frames.all_back(Kind::At, *route);

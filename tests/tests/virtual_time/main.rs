@@ -35,6 +35,7 @@ mod local;
 mod loops;
 mod loss;
 mod many;
+mod missing_drives;
 mod modes;
 mod motion_checker;
 mod nameplate;

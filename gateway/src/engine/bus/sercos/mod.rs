@@ -188,7 +188,9 @@ impl SercosBus {
         match event {
             Event::Scanned { .. } => self.refused.clear(),
             // Its data are listened to again, and it was spoken to all the time.
-            Event::SlaveReturned { .. } if self.has_all_slaves() => self.recovery.find_all(),
+            Event::SlaveReturned { .. } if self.missing() == Missing::None => self.recovery.find_all(),
+            // There is no hot plug in a ring: one that was lost before is amid the others now.
+            Event::RingClosed if self.missing() == Missing::LeftOut => self.recovery.miss(now),
             Event::Isolated { .. } => self.recovery.isolate(),
             Event::OtherMaster(_) => self.doubt_all(now, system, axes),
             Event::GaveWay => {
@@ -198,9 +200,11 @@ impl SercosBus {
             Event::AwaitingApplication { phase } => self.begin_all(*phase, mapping, notice),
             Event::HotPlugAwaits { slave, address, phase } => self.begin_joining(*slave, *address, *phase),
             Event::HotPlugged { slave, .. } => self.complete_joining(*slave),
-            Event::HotPlugRefused { address: Some(address), reason } => {
-                self.refuse_joining(now, system, *address, *reason, axes);
-            }
+            // Nothing but a new scan brings it in.
+            Event::HotPlugRefused {
+                address: Some(address),
+                reason: HotPlugRefusal::Misfit(_) | HotPlugRefusal::Several | HotPlugRefusal::NoTelegram,
+            } if self.drives.iter().any(|drive| drive.setup.address == *address) => self.recovery.miss(now),
             // What it was that failed; that the slave does not come in follows.
             Event::StepFailed { slave, .. }
             | Event::ClassMismatch { slave }
@@ -248,17 +252,13 @@ impl SercosBus {
         }
     }
 
-    /// Whether every drive has a slave, and the master has lost none of them.
-    fn has_all_slaves(&self) -> bool {
-        self.drives.iter().all(|drive| drive.slave.is_some() && !self.is_lost(drive))
-    }
-
-    /// Whether a slave comes back by hot plug, and needs no new scan.
+    /// Whether a slave comes back by hot plug, and needs no new scan. It can come in at the end of a line, and not amid others that
+    /// are heard past it.
     fn comes_by_hot_plug(&self, slave: SlaveId, address: u16) -> bool {
         let facts = self.master.slave(slave).map(|info| info.facts);
         let has_class = facts.is_some_and(|facts| facts.version(ScpClass::HOT_PLUG).is_some());
         let configured = |drive: &Drive| drive.setup.address == address && drive.hot_plug;
-        has_class || self.drives.iter().any(configured)
+        (has_class || self.drives.iter().any(configured)) && !self.master.is_passed(slave)
     }
 
     /// Nobody knows which master a drive follows.
@@ -276,13 +276,18 @@ impl SercosBus {
         }
     }
 
-    /// What the bus is without. A drive that was left out does not come by hot plug either: it is there.
+    /// What the bus is without: the worst of all its drives.
     fn missing(&self) -> Missing {
-        let gone = || self.drives.iter().filter(|drive| drive.slave.is_none());
-        let is_found = |drive: &Drive| self.master.slave_by_address(drive.setup.address).is_some();
-        if gone().any(is_found) {
+        self.drives.iter().map(|drive| self.missing_of(drive)).max().unwrap_or(Missing::None)
+    }
+
+    /// Whether a drive is missing, and how. One that was found and is lost or left out does not come later by itself: it is there.
+    fn missing_of(&self, drive: &Drive) -> Missing {
+        if drive.slave.is_some() && !self.is_lost(drive) {
+            Missing::None
+        } else if self.master.slave_by_address(drive.setup.address).is_some() {
             Missing::LeftOut
-        } else if gone().all(|drive| drive.hot_plug) {
+        } else if drive.hot_plug {
             Missing::None
         } else {
             Missing::Absent
@@ -360,7 +365,8 @@ impl SercosBus {
     fn begin(&mut self, place: usize, mapping: &Mapping, notice: &mut dyn FnMut(Notice)) {
         let drive = &mut self.drives[place];
         let found = self.master.slave_by_address(drive.setup.address);
-        drive.slave = found.filter(|slave| !self.refused.contains(slave));
+        // One that was left out, or was lost since the scan, is not waited for.
+        drive.slave = found.filter(|slave| takes_part(&self.master, *slave));
         drive.setup.restart(drive.slave.is_some_and(|slave| is_fixed(&self.master, slave)));
         let other = drive.slave.and_then(|slave| self.master.slave(slave)?.facts.fsp_type).and_then(no_drive);
         if let (Some(what), Some(slave)) = (other, drive.slave) {
@@ -373,7 +379,7 @@ impl SercosBus {
             drive.plan(mapping, Phase::CP2, notice);
         } else {
             drive.stage = Stage::Absent;
-            // One that was refused has been reported with the reason.
+            // What has become of one that was found has been reported.
             if !drive.hot_plug && found.is_none() {
                 notice(Notice::DriveMissing { axis: axis_number(drive.axis), address: drive.setup.address });
             }
@@ -388,6 +394,11 @@ impl SercosBus {
         let mut busy = false;
         for drive in drives {
             let (Stage::Commissioning, Some(slave)) = (&drive.stage, drive.slave) else { continue };
+            if !takes_part(master, slave) {
+                // No request to it would be taken any more, and the others would wait for it.
+                drive.lose();
+                continue;
+            }
             let mut submit = |request| master.svc_submit(slave, request).ok();
             let Some(progress) = drive.setup.poll(mapping, &mut submit, notice) else { continue };
             drive.stage = Stage::Ready;
@@ -425,8 +436,7 @@ impl SercosBus {
     }
 
     fn is_joining(&self, slave: SlaveId) -> bool {
-        let joining = |drive: &Drive| matches!(drive.stage, Stage::Joining { .. });
-        self.drives.iter().any(|drive| drive.slave == Some(slave) && joining(drive))
+        self.drives.iter().any(|drive| drive.joining_slave() == Some(slave))
     }
 
     /// A slave has come in by hot plug.
@@ -513,24 +523,13 @@ impl SercosBus {
         }
     }
 
-    /// A drive does not come in.
-    fn refuse_joining(
-        &mut self,
-        now: MonotonicTime,
-        system: SystemTime,
-        address: u16,
-        reason: HotPlugRefusal,
-        axes: &mut [AxisChannel],
-    ) {
-        let Some(drive) = self.drives.iter_mut().find(|drive| drive.setup.address == address) else { return };
-        if matches!(drive.stage, Stage::Joining { .. }) {
+    /// Gives up the drives that the master does not let in. It reports the same refusal only once, however often a drive tries.
+    fn end_joining(&mut self, now: MonotonicTime, system: SystemTime, axes: &mut [AxisChannel]) {
+        let Self { master, drives, .. } = self;
+        let refused = |slave| !takes_part(master, slave);
+        for drive in drives.iter_mut().filter(|drive| drive.joining_slave().is_some_and(refused)) {
             drive.lose();
             axes[drive.axis].leave_south(now, system);
-        }
-        use HotPlugRefusal as R;
-        if matches!(reason, R::Misfit(_) | R::Several | R::NoTelegram) {
-            // Nothing but a new scan brings it in.
-            self.recovery.miss(now);
         }
     }
 
@@ -585,7 +584,11 @@ impl SercosBus {
         let asked = |drive: &Drive| drive.accesses.contains(ticket);
         let own = |drive: &Drive| drive.slave == Some(ticket.slave);
         let place = self.drives.iter().position(asked).or_else(|| self.drives.iter().position(own));
-        let Some(place) = place else { return };
+        let Some(place) = place else {
+            // It may have a buffer, which is not freed in the cycle.
+            self.commissioner.push(Job::Spent(outcome));
+            return;
+        };
         let drive = &mut self.drives[place];
         if let Stage::Joining { ticket: sent } = &mut drive.stage
             && *sent == Some(ticket)
@@ -790,6 +793,7 @@ impl South for SercosBus {
                 }
             }
         }
+        self.end_joining(now, system, axes);
         self.commission(mapping, axes, notice);
         self.let_join(now, system, axes, notice);
         for place in 0..self.drives.len() {
@@ -849,6 +853,11 @@ impl Drive {
         self.slave.filter(|_| !matches!(self.stage, Stage::Joining { .. }))
     }
 
+    /// Its slave, while it is on its way in by hot plug.
+    fn joining_slave(&self) -> Option<SlaveId> {
+        self.slave.filter(|_| matches!(self.stage, Stage::Joining { .. }))
+    }
+
     /// Its work for the commissioner, from its place among the drives.
     fn run(&self, place: usize) -> Run {
         Run::new(place, self.runs)
@@ -898,6 +907,12 @@ const fn no_drive(fsp_type: u32) -> Option<&'static str> {
         3 => Some("an encoder (3)"),
         _ => None,
     }
+}
+
+/// Whether a slave takes part, or is on its way in.
+fn takes_part(master: &Master, slave: SlaveId) -> bool {
+    let presence = master.slave(slave).map(|info| info.presence);
+    matches!(presence, Some(Presence::Active | Presence::Joining))
 }
 
 /// Whether the connections of a slave cannot be configured.

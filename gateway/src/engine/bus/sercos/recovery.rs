@@ -13,12 +13,12 @@ const PAUSE_MAX: DurationNs = DurationNs::from_secs(320);
 const RETRY_PAUSE: DurationNs = DurationNs::from_secs(2);
 
 /// Which drives a bus is without that cannot come later.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Missing {
     None,
     /// One that was not found.
     Absent,
-    /// One that was found and left out: what was wrong may have been read wrongly, or is over.
+    /// One that was found, and lost or left out: what was wrong may have been read wrongly, or is over.
     LeftOut,
 }
 
