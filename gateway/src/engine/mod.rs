@@ -368,7 +368,7 @@ impl Engine {
     fn take_feedback(&mut self, now: MonotonicTime, due: &Due) {
         let (mut stepped, mut off) = ([false; BUSES_MAX], [false; BUSES_MAX]);
         for (place, bus) in self.buses.iter_mut().enumerate() {
-            stepped[place] = due[place].is_some() && bus.take_cycle();
+            stepped[place] = due[place].is_some() && bus.take_cycle(now);
             off[place] = bus.next_cycle().is_none();
         }
         let system = self.clock.base.system_at(now);

@@ -30,10 +30,7 @@ impl Master {
         }
         let left_out = core::mem::take(&mut self.grid.left_out);
         if self.sends() && !left_out {
-            if !self.grid.evaluated {
-                self.net.journal.statistics.at_missing += u64::from(!self.is_complete());
-                self.evaluate(now);
-            }
+            self.evaluate_rest(now);
             self.end_cycle();
         }
         for _ in 0..STATES_PER_CYCLE {
@@ -196,6 +193,14 @@ impl Master {
             return None;
         }
         Some(PhaseEvent::Proceed)
+    }
+
+    /// Takes what the ATs of this cycle say, if that was not done: not all of them are back.
+    pub(super) fn evaluate_rest(&mut self, now: MonotonicTime) {
+        if !self.grid.evaluated {
+            self.net.journal.statistics.at_missing += u64::from(!self.is_complete());
+            self.evaluate(now);
+        }
     }
 
     /// Takes what the ATs of this cycle say.

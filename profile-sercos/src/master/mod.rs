@@ -13,8 +13,8 @@
 //! ```
 //!
 //! All storage is set aside in [`Master::new`]; nothing is allocated or freed afterwards. The ATs are evaluated as
-//! soon as the last one of the cycle is back, and at the start of the next cycle if one stays away. All frames of
-//! a cycle are given at its start, MDTs before ATs: a soft master cannot keep t1 to the nanosecond, and slaves
+//! soon as the last one of the cycle is back, and if one stays away by [`Master::collect`] or at the start of the next cycle. All frames
+//! of a cycle are given at its start, MDTs before ATs: a soft master cannot keep t1 to the nanosecond, and slaves
 //! learn of that by S-0-1023 and S-0-1032.
 
 mod build;
@@ -219,6 +219,15 @@ impl Master {
         }
     }
 
+    /// Takes what has come back of the cycle whose frames are out, also where some of it stays away: the values of a slave do not
+    /// wait for those of others. To be called ahead of the next cycle, before the application takes values. Outside of CP4 nothing
+    /// is taken before the next cycle begins.
+    pub fn collect(&mut self, now: MonotonicTime) {
+        if self.run.state() == State::Cp4 && !self.net.frames.has_transmit() && !self.grid.left_out {
+            self.evaluate_rest(now);
+        }
+    }
+
     /// Builds the frames of the next cycle ahead of its instant; [`Master::poll`] gives them when that has come. To be called
     /// when everything of the cycle before has come back and all values are committed. Outside of CP4 nothing is built ahead.
     pub fn prepare(&mut self) {
@@ -280,7 +289,7 @@ impl Master {
         }
     }
 
-    /// Whether all ATs of the present cycle are back and taken over.
+    /// Whether what has come back of the present cycle is taken over: all ATs, or those that were back at [`Master::collect`].
     #[must_use]
     pub fn cycle_complete(&self) -> bool {
         self.grid.evaluated

@@ -152,3 +152,52 @@ fn a_drive_with_hot_plug_at_the_end_of_a_line_needs_no_new_scan() {
     rig.run_for(millis(20_000));
     assert_eq!((scans(&rig), rig.status().phase), (0, 4), "{}", rig.told());
 }
+
+/// Cycles in a row, at most, for which the gateway has heard nothing of each axis within half a second.
+fn longest_silences(rig: &mut Rig, change: impl FnOnce(&mut Rig)) -> Vec<u32> {
+    let mut longest = vec![0; rig.engine.axes().len()];
+    change(rig);
+    let end = rig.now() + millis(500);
+    while rig.now() < end {
+        rig.step();
+        for (longest, axis) in longest.iter_mut().zip(rig.engine.axes()) {
+            *longest = axis.feedback().age_cycles.max(*longest);
+        }
+    }
+    longest
+}
+
+/// A drive whose telegram has come was heard, whatever becomes of those of another line.
+#[test]
+fn a_drive_is_heard_while_others_are_searched_for() {
+    let configuration = in_a_ring(BOX);
+    let kinds = || vec![(1, UnitKind::Rotary), (2, UnitKind::Linear)];
+    // A line on each port: the cable to the second one is cut.
+    let mut rig = Rig::new(Settings { configuration, drives: kinds(), ..Settings::default() });
+    rig.line = hot_plug_drives(kinds(), true);
+    rig.line.cut(1);
+    rig.until_ready();
+    let silences = longest_silences(&mut rig, |rig| rig.line.cut(2));
+    assert!(silences[0] == 0 && silences[1] > 100, "{silences:?}");
+}
+
+/// In a ring those behind a drive that hangs are heard again as soon as one of them turns the telegrams round.
+#[test]
+fn no_drive_of_a_ring_is_unheard_for_long_because_another_one_hangs() {
+    let configuration = in_a_ring(&with_a_place().configuration).replace("hot_plug = true\n", "");
+    let kinds = || vec![(1, UnitKind::Rotary), (2, UnitKind::Linear), (3, UnitKind::Linear)];
+    let mut seen = Vec::new();
+    for hung in 0..3 {
+        let mut rig = Rig::new(Settings {
+            configuration: configuration.clone(),
+            drives: kinds(),
+            ..Settings::default()
+        });
+        rig.line = hot_plug_drives(kinds(), true);
+        rig.until_ready();
+        let mut silences = longest_silences(&mut rig, |rig| rig.line.set_hung(hung, true));
+        silences.remove(hung);
+        seen.push(silences.into_iter().max());
+    }
+    assert!(seen.iter().all(|longest| longest.is_some_and(|cycles| cycles <= 5)), "{seen:?}");
+}

@@ -174,8 +174,8 @@ pub trait South {
     /// Receives all waiting frames.
     fn receive(&mut self, now: MonotonicTime, port: &mut SouthPort<'_>);
 
-    /// Whether a cycle was sent since the last call of this method. If so, there is feedback to take.
-    fn take_cycle(&mut self) -> bool;
+    /// Whether a cycle was sent since the last call of this method. If so, there is feedback to take: what has come back until now.
+    fn take_cycle(&mut self, now: MonotonicTime) -> bool;
 
     /// Values of the drive in the cycle that has ended; `None` if the drive is not in cyclic operation.
     fn feedback(&self, axis: usize) -> Option<Received<'_>>;

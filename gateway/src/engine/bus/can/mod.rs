@@ -513,7 +513,7 @@ impl South for CanBus {
         link.receive(now, *port, &mut Stations { master, assigner });
     }
 
-    fn take_cycle(&mut self) -> bool {
+    fn take_cycle(&mut self, _now: MonotonicTime) -> bool {
         let cycles = self.master.statistics().syncs;
         let taken = std::mem::replace(&mut self.cycles_seen, cycles) != cycles;
         if taken {

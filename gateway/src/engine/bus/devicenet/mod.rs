@@ -503,7 +503,7 @@ impl South for DevicenetBus {
         self.exchange(|link, node| link.receive(now, *port, node));
     }
 
-    fn take_cycle(&mut self) -> bool {
+    fn take_cycle(&mut self, _now: MonotonicTime) -> bool {
         let cycles = self.master.statistics().cycles;
         let taken = std::mem::replace(&mut self.cycles_seen, cycles) != cycles;
         if taken {

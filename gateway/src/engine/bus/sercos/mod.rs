@@ -711,7 +711,8 @@ impl South for SercosBus {
         self.master.phase().is_none()
     }
 
-    fn take_cycle(&mut self) -> bool {
+    fn take_cycle(&mut self, now: MonotonicTime) -> bool {
+        self.master.collect(now);
         let cycles = self.master.statistics().cycles;
         std::mem::replace(&mut self.cycles_seen, cycles) != cycles
     }
@@ -723,7 +724,7 @@ impl South for SercosBus {
         }
         let [_, feedback] = drive.connections;
         let consumer = self.master.consumer(drive.present_slave()?, feedback)?;
-        // Without the ATs of this cycle what is there is that of the last one.
+        // Of a cycle that was left out nothing comes: what is there is that of the last one.
         Some(Received {
             data: consumer.data,
             fresh: consumer.fresh && self.master.cycle_complete(),
