@@ -196,7 +196,13 @@ mod tests {
 
     #[test]
     fn a_tree_is_written_with_its_rows() {
-        let row = Origin { file: "a.toml".into(), line: 3, section: "signal", key: "position".into() };
+        let row = Origin {
+            file: "a.toml".into(),
+            line: 3,
+            section: "signal",
+            key: "position".into(),
+            path: String::new(),
+        };
         let mut tree = Node::new("axis");
         tree.push(Node::new(hex(&[1, 0xA0])).by(Some(row)));
         let text = |names| {

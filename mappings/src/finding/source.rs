@@ -83,11 +83,14 @@ impl Source {
         (1..=part.lines.len()).map(|line| part.line(line)).find(|line| wanted(&part.text[line.clone()]))
     }
 
-    /// A line (1 first) of the file with this name, without its indentation; the last such file, as the ones laid over others are.
+    /// A line (1 first) of the file with this path, without its indentation; the last such file, as the ones laid over others are.
     #[must_use]
-    pub fn line_of(&self, file: &str, line: usize) -> Option<Range<usize>> {
-        let named = |part: &&Part| part.path.rsplit('/').next() == Some(file);
-        let part = self.parts.iter().rfind(named).filter(|part| (1..=part.lines.len()).contains(&line))?;
+    pub fn line_of(&self, path: &str, line: usize) -> Option<Range<usize>> {
+        let part = self
+            .parts
+            .iter()
+            .rfind(|part| &*part.path == path)
+            .filter(|part| (1..=part.lines.len()).contains(&line))?;
         let whole = part.line(line);
         let text = &part.text[whole.clone()];
         let start = whole.start + text.len() - text.trim_start().len();
@@ -183,13 +186,13 @@ mod tests {
         let text = "rows = [\n  # accept: above\n  { a = 1 },\n  { b = 1 }, # accept: at its end\n  { c = 1 },\n]\n\n\
             [[x]]\nd = 1\n# accept: inside\n\n[[y]]\ne = 1 # accept:\n";
         let source = Source::new("folder/a.toml", text);
-        let reason = |line| source.accepts(&source.line_of("a.toml", line).unwrap());
+        let reason = |line| source.accepts(&source.line_of("folder/a.toml", line).unwrap());
         assert_eq!(
             [3, 4, 5, 9, 12].map(reason),
             [Some("above"), Some("at its end"), None, Some("inside"), None]
         );
-        assert_eq!(source.line_of("a.toml", 99), None);
-        assert_eq!(source.line_of("b.toml", 1), None);
+        assert_eq!(source.line_of("folder/a.toml", 99), None);
+        assert_eq!(source.line_of("other/a.toml", 1), None);
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::finding::Source;
 /// Where a row stands.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Origin {
-    /// The file.
+    /// The name of the file.
     pub file: String,
     /// Line of the value that the row is named by, 1 first.
     pub line: usize,
@@ -29,6 +29,9 @@ pub struct Origin {
     pub section: &'static str,
     /// What the row is about, in the words of the table.
     pub key: String,
+    /// The whole path of the file: others may have the same name.
+    #[serde(skip)]
+    pub path: String,
 }
 
 impl fmt::Display for Origin {
@@ -52,7 +55,7 @@ fn find<R>(
 fn origin(text: &Source, section: &'static str, name: &Name) -> Origin {
     let (path, line, _) = text.place(name.span().start);
     let file = path.rsplit('/').next().unwrap_or_default().to_owned();
-    Origin { file, line, section, key: name.get_ref().clone() }
+    Origin { file, line, section, key: name.get_ref().clone(), path: path.to_owned() }
 }
 
 /// Rows between CIP Motion and the generic model.
@@ -119,7 +122,7 @@ impl Mapping {
     pub fn place_of(&self, row: &Origin) -> Option<(&Source, Range<usize>)> {
         let Tables { cip_generic, generic_sercos, generic_cia402, .. } = &self.tables;
         let texts = [&cip_generic.text, &generic_sercos.text, &generic_cia402.text];
-        texts.into_iter().find_map(|text| Some((&**text, text.line_of(&row.file, row.line)?)))
+        texts.into_iter().find_map(|text| Some((&**text, text.line_of(&row.path, row.line)?)))
     }
 
     /// The `[[scaling]]` row of a quantity on SERCOS drives.

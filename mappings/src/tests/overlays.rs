@@ -162,3 +162,27 @@ fn a_finding_in_a_row_of_an_overlay_points_into_the_overlay() {
         (code::UNKNOWN_NAME, "own.toml", 6, 7)
     );
 }
+
+/// Two folders can have overlays of the same name: a row is found in its own.
+#[test]
+fn a_row_is_found_in_its_own_file_whatever_the_others_are_called() {
+    let mut texts = TableTexts::embedded();
+    let row = |parameter: &str, reason: &str| {
+        format!(
+            "format = 1\noverlay = \"test\"\n\n[[generic-sercos.parameter]]\nparameter = \"{parameter}\"\nmissing = \"reject\"{reason}\n"
+        )
+    };
+    texts.overlays = vec![
+        Overlay::new("machine/own.toml", &row("jerk_limit", "")),
+        Overlay::new("drives/own.toml", &row("torque_limit_positive", " # accept: of another row")),
+    ];
+    let mapping = Mapping::from_texts(&texts).unwrap_or_else(|findings| panic!("{findings}"));
+    let origin = mapping.parameter_row(Parameter::JERK_LIMIT).unwrap();
+    assert_eq!((origin.file.as_str(), origin.line), ("own.toml", 5));
+    let (source, span) = mapping.place_of(&origin).unwrap();
+    assert_eq!(source.place(span.start), ("machine/own.toml", 5, 1));
+    assert_eq!(source.accepts(&span), None);
+    let origin = mapping.parameter_row(Parameter::TORQUE_LIMIT_POSITIVE).unwrap();
+    let (source, span) = mapping.place_of(&origin).unwrap();
+    assert_eq!(source.accepts(&span), Some("of another row"));
+}
