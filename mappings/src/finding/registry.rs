@@ -144,7 +144,7 @@ macro_rules! registry {
 
 registry! {
     UNREADABLE = 1 Error "the file cannot be read":
-        "A configuration, a table, an overlay or a folder that was named does not exist, or the system does not allow reading it.",
+        "A configuration, a table, an overlay or a folder that was named does not exist, the system does not allow reading it, or the folder has no overlay in it.",
         "[mappings]\noverlays = [\"no-such-file.toml\"]",
         "Correct the path. Paths in a configuration and in `base` are relative to the folder of the file that names them.";
     TOO_LONG = 2 Error "the file is too long":

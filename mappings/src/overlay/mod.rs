@@ -219,22 +219,32 @@ impl TableTexts {
     /// Lays a file, or the files of a folder in the order of their names, over the tables; what they build on comes first. What
     /// cannot be read, or builds on itself, is a finding.
     pub fn lay_over(&mut self, path: &Path, findings: &mut Findings) {
-        let mut files = vec![path.to_owned()];
-        if path.is_dir() {
-            match path.read_dir() {
-                Ok(entries) => files = entries.flatten().map(|entry| entry.path()).collect(),
-                Err(error) => {
-                    findings.push_file(code::UNREADABLE, path, format!("expected a folder, got: {error}"))
-                }
-            }
-            files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
-            files.sort();
-        }
+        let files = if path.is_dir() { files_of(path, findings) } else { vec![path.to_owned()] };
         let mut reader = Reader { overlays: &mut self.overlays, findings, above: Vec::new() };
         for file in files {
             reader.read(&file, None);
         }
     }
+}
+
+/// The overlays of a folder, in the order of their names. One without any is as wrong as a file that is not there.
+fn files_of(folder: &Path, findings: &mut Findings) -> Vec<PathBuf> {
+    let entries: Result<Vec<_>, _> = folder.read_dir().and_then(Iterator::collect);
+    let entries = match entries {
+        Ok(entries) => entries,
+        Err(error) => {
+            findings.push_file(code::UNREADABLE, folder, format!("expected a folder, got: {error}"));
+            return Vec::new();
+        }
+    };
+    let mut files: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "toml"));
+    files.sort();
+    if files.is_empty() {
+        let message = "expected overlays in the folder, files whose names end in .toml";
+        findings.push_file(code::UNREADABLE, folder, message);
+    }
+    files
 }
 
 /// Reads overlays with what they build on.

@@ -186,3 +186,19 @@ fn a_row_is_found_in_its_own_file_whatever_the_others_are_called() {
     let (source, span) = mapping.place_of(&origin).unwrap();
     assert_eq!(source.accepts(&span), Some("of another row"));
 }
+
+#[test]
+fn a_folder_without_overlays_is_an_error() {
+    let folder = std::env::temp_dir().join(format!("axisbridge-overlays-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("line-4")).unwrap();
+    let load = || TableTexts::load(None, std::slice::from_ref(&folder)).map(|texts| texts.overlays.len());
+    std::fs::write(folder.join("line-4/own.toml"), EXAMPLE).unwrap();
+    std::fs::write(folder.join("own.toml.bak"), EXAMPLE).unwrap();
+    let findings = load().unwrap_err();
+    let [finding] = findings.list() else { panic!("{findings}") };
+    assert_eq!((finding.code, finding.file.as_str()), (code::UNREADABLE, folder.to_str().unwrap()));
+    assert_eq!(finding.expected, "expected overlays in the folder, files whose names end in .toml");
+    std::fs::write(folder.join("own.toml"), EXAMPLE).unwrap();
+    assert_eq!(load().unwrap(), 1);
+    std::fs::remove_dir_all(folder).unwrap();
+}
