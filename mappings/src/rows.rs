@@ -41,7 +41,9 @@ pub(super) fn lay_over<'t, T: DeserializeOwned>(
     let bases: Vec<usize> = layers.iter().map(|layer| layer.add_to(&mut text)).collect();
     let mut hints = overlay::Hints::new();
     for (layer, base) in layers.iter().zip(bases).filter(|(layer, _)| layer.touches(name)) {
-        hints.extend(overlay::lay(layer, base, name, tree.get_mut(), &text, findings));
+        let laid = overlay::lay(layer, base, name, tree.get_mut(), &text, findings);
+        hints.extend(laid.hints);
+        text.lose(laid.losses);
     }
     twice::leave_out(name, tree.get_mut(), &text, findings);
     let hint = |problem: &Problem| {

@@ -78,8 +78,7 @@ fn changes(
         Some(old) if TableTexts::replaces(old) => Mapping::load(Some(old), &[]),
         Some(old) => Mapping::load(None, &[old.to_owned()]),
     };
-    let (mapping, texts) = (&outcome.tables.mapping, &outcome.tables.texts);
-    let (Ok(before), Some(mapping), Some(texts)) = (&before, mapping, texts) else {
+    let (Ok(before), Some(mapping)) = (&before, &outcome.tables.mapping) else {
         let mut findings = outcome.tables.findings.clone();
         findings.extend(before.err().unwrap_or_default());
         findings.retain(|finding| finding.severity() == Severity::Error);
@@ -89,7 +88,7 @@ fn changes(
         };
         return print(text, ExitCode::FAILURE);
     };
-    let changes = diff::changes(before, mapping, texts);
+    let changes = diff::changes(before, mapping);
     let text = match format {
         CheckFormat::Json => format!("{:#}\n", changes.json()),
         _ => changes.to_string(),

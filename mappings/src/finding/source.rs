@@ -8,6 +8,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct Source {
     parts: Vec<Part>,
+    /// Values that a row laid over the others has taken away or replaced, and the place of that row.
+    losses: Vec<(Range<usize>, Range<usize>)>,
 }
 
 /// One file of a [`Source`].
@@ -36,7 +38,7 @@ impl Source {
     /// A single file.
     #[must_use]
     pub fn new(path: &str, text: &str) -> Self {
-        let mut source = Self { parts: Vec::new() };
+        let mut source = Self { parts: Vec::new(), losses: Vec::new() };
         source.push(path.into(), text.into());
         source
     }
@@ -111,6 +113,26 @@ impl Source {
             .filter_map(|at| line(at).split_once("# accept:"))
             .map(|(_, reason)| reason.trim())
             .find(|reason| !reason.is_empty())
+    }
+
+    /// Keeps which values rows that were laid over others have taken away or replaced, each with the place of that row.
+    pub(crate) fn lose(&mut self, losses: Vec<(Range<usize>, Range<usize>)>) {
+        self.losses.extend(losses);
+    }
+
+    /// The reason for which a row that was laid over these texts took a value of `other` away. A value that several rows had in common
+    /// went for a reason if each of them did.
+    #[must_use]
+    pub fn accepts_loss(&self, other: &Self, span: &Range<usize>) -> Option<&str> {
+        let lost = other.locate(span)?;
+        let is_same = |place: Place<'_>| place.part.path == lost.part.path && place.span == lost.span;
+        let mut reasons = self
+            .losses
+            .iter()
+            .filter(|(value, _)| self.locate(value).is_some_and(is_same))
+            .map(|(_, row)| self.accepts(row));
+        let first = reasons.next()??;
+        reasons.all(|reason| reason.is_some()).then_some(first)
     }
 
     /// The text of a place, as far as it lies in one line.

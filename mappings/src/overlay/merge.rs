@@ -23,6 +23,15 @@ type Value<'t> = Spanned<DeValue<'t>>;
 /// What is known of new rows, by their places.
 pub(crate) type Hints = Vec<(Range<usize>, Hint)>;
 
+/// What comes of laying rows over a table.
+#[derive(Debug, Default)]
+pub(crate) struct Laid {
+    /// What to do about keys that new rows lack.
+    pub hints: Hints,
+    /// Values that were taken away or replaced, and the row that did it, by their places.
+    pub losses: Vec<(Range<usize>, Range<usize>)>,
+}
+
 /// What is known of a row that the table does not have.
 #[derive(Debug)]
 pub(crate) struct Hint {
@@ -51,8 +60,7 @@ impl Hint {
     }
 }
 
-/// Lays what a layer has of a table over it. `base` is where the layer begins in the source. What to do about keys that a new row
-/// lacks comes back.
+/// Lays what a layer has of a table over it. `base` is where the layer begins in the source.
 pub(crate) fn lay<'t>(
     layer: &Layer<'t>,
     base: usize,
@@ -60,9 +68,9 @@ pub(crate) fn lay<'t>(
     table: &mut DeTable<'t>,
     source: &Source,
     findings: &mut Findings,
-) -> Hints {
-    let Some(rows) = layer.rows(name) else { return Hints::new() };
-    let mut merger = Merger { source, findings, table: name, hints: Hints::new() };
+) -> Laid {
+    let Some(rows) = layer.rows(name) else { return Laid::default() };
+    let mut merger = Merger { source, findings, table: name, laid: Laid::default() };
     let rows = shifted(rows, base);
     let span = rows.span();
     let DeValue::Table(mut rows) = rows.into_inner() else {
@@ -74,7 +82,7 @@ pub(crate) fn lay<'t>(
         merger
             .findings
             .push(source, problem.help(format!("write the list as well, as in {}", lists.join(", "))));
-        return merger.hints;
+        return merger.laid;
     };
     groups::spread(&mut rows);
     if name == "cip-generic" {
@@ -112,7 +120,7 @@ pub(crate) fn lay<'t>(
             }
         }
     }
-    merger.hints
+    merger.laid
 }
 
 struct Merger<'a> {
@@ -120,13 +128,22 @@ struct Merger<'a> {
     findings: &'a mut Findings,
     /// The table that rows are laid over.
     table: &'a str,
-    /// What to do about keys that new rows lack.
-    hints: Hints,
+    laid: Laid,
 }
 
 impl Merger<'_> {
     fn problem(&mut self, code: Code, span: Range<usize>, key: &str, expected: impl Into<String>) {
         self.findings.push(self.source, Problem::new(code, span).key(key).expected(expected));
+    }
+
+    /// Notes that a row took a value away, with all that is in it.
+    fn lost(&mut self, value: &Value<'_>, by: &Range<usize>) {
+        self.laid.losses.push((value.span(), by.clone()));
+        match value.get_ref() {
+            DeValue::Array(values) => values.iter().for_each(|value| self.lost(value, by)),
+            DeValue::Table(table) => table.values().for_each(|value| self.lost(value, by)),
+            _ => {}
+        }
     }
 
     /// Lays rows over a list.
@@ -186,7 +203,7 @@ impl Merger<'_> {
                             "expected no other keys in a row that is removed",
                         );
                     }
-                    known.remove(at);
+                    self.lost(&known.remove(at), &span);
                 }
                 (None, Some((place, _))) => {
                     let message = format!("expected a row of `{}` that is there", section.name);
@@ -197,12 +214,12 @@ impl Merger<'_> {
                     self.findings.push(self.source, problem.help(help.unwrap_or_default()));
                 }
                 (Some(at), remove) => {
-                    let removed =
-                        remove.is_some_and(|(place, value)| self.remove_keys(&mut known[at], place, value));
+                    let removed = remove
+                        .is_some_and(|(place, value)| self.remove_keys(&mut known[at], place, value, &span));
                     self.row(section, &mut known[at], row, span, removed);
                 }
                 (None, None) => {
-                    self.hints.extend(hint(section, &row, &known).map(|hint| (span.clone(), hint)));
+                    self.laid.hints.extend(hint(section, &row, &known).map(|hint| (span.clone(), hint)));
                     let row = Spanned::new(span, DeValue::Table(row));
                     if section.first_wins && !last {
                         known.insert(added, row);
@@ -243,14 +260,22 @@ impl Merger<'_> {
     }
 
     /// Takes keys of a row away; whether there were any.
-    fn remove_keys(&mut self, row: &mut Value<'_>, place: Range<usize>, keys: &DeValue<'_>) -> bool {
+    fn remove_keys(
+        &mut self,
+        row: &mut Value<'_>,
+        place: Range<usize>,
+        keys: &DeValue<'_>,
+        by: &Range<usize>,
+    ) -> bool {
         let (DeValue::Table(row), DeValue::Array(keys)) = (row.get_mut(), keys) else {
             self.problem(code::WRONG_TYPE, place, REMOVE, "expected true, or a list of keys");
             return true;
         };
         for key in keys {
             let found = key.get_ref().as_str().and_then(|name| row.remove(name));
-            if found.is_none() {
+            if let Some(found) = &found {
+                self.lost(found, by);
+            } else {
                 let keys: Vec<String> = row.keys().map(|key| format!("`{}`", key.get_ref())).collect();
                 let message = format!("expected a key that the row has: {}", keys.join(", "));
                 self.problem(code::OVERLAY_REMOVES_NOTHING, key.span(), REMOVE, message);
@@ -274,7 +299,9 @@ impl Merger<'_> {
         };
         if section.either.iter().any(|key| row.contains_key(*key)) {
             for key in section.either.iter().filter(|key| !row.contains_key(**key)) {
-                changed |= table.remove(*key).is_some();
+                let old = table.remove(*key);
+                changed |= old.is_some();
+                old.iter().for_each(|old| self.lost(old, &span));
             }
         }
         let mut nested = false;
@@ -286,11 +313,14 @@ impl Merger<'_> {
                     nested = true;
                     self.list(list, known, value);
                 }
-                (_, old) => {
-                    changed |= !is_key
-                        && old.is_none_or(|old| canonical(old.get_ref()) != canonical(value.get_ref()));
+                _ => {
                     // What identifies the row is shown where the overlay has it.
-                    table.remove(key.get_ref().as_ref());
+                    let old = table.remove(key.get_ref().as_ref());
+                    let same = |old: &Value<'_>| canonical(old.get_ref()) == canonical(value.get_ref());
+                    if !is_key && !old.as_ref().is_some_and(same) {
+                        changed = true;
+                        old.iter().for_each(|old| self.lost(old, &span));
+                    }
                     table.insert(key, value);
                 }
             }
@@ -314,7 +344,11 @@ impl Merger<'_> {
         let mut changed = false;
         for (key, value) in value {
             let old = known.remove(key.get_ref().as_ref());
-            changed |= old.is_none_or(|old| canonical(old.get_ref()) != canonical(value.get_ref()));
+            let same = |old: &Value<'_>| canonical(old.get_ref()) == canonical(value.get_ref());
+            if !old.as_ref().is_some_and(same) {
+                changed = true;
+                old.iter().for_each(|old| self.lost(old, &value.span()));
+            }
             known.insert(key, value);
         }
         if !changed {

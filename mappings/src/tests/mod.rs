@@ -9,6 +9,7 @@ mod completeness;
 mod computed;
 mod cyclic_axis;
 mod dangerous;
+mod differences;
 mod families;
 mod overlays;
 mod sercos_dictionary;

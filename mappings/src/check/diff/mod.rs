@@ -5,6 +5,9 @@
 //! mapping tables are compared, row by row, not their order. Of the dictionaries only what a parameter of a vendor has there is
 //! compared: its own row, its attribute, its IDN and its object.
 
+mod cia402;
+mod cip;
+mod sercos;
 mod vendor;
 
 use std::fmt;
@@ -13,9 +16,9 @@ use std::ops::Range;
 use profile_generic::ratio::Ratio;
 use serde_json::{Value, json};
 
+use crate::Mapping;
 use crate::finding::{Source, Spanned};
-use crate::format::{FieldValueRow, Name, RatioRow, UnitRow, listed};
-use crate::{Mapping, TableTexts};
+use crate::format::{FieldValueRow, Name, RatioRow, UnitRow};
 
 /// What a change is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +45,10 @@ pub enum Aspect {
     Unit,
     /// How a value is held at one of its ends.
     Type,
+    /// What is written into a drive, read from it or executed by it at start.
+    Step,
+    /// Something that no other aspect names.
+    Other,
 }
 
 impl Aspect {
@@ -60,6 +67,8 @@ impl Aspect {
             Self::Access => "access",
             Self::Unit => "unit",
             Self::Type => "type",
+            Self::Step => "step",
+            Self::Other => "other",
         }
     }
 }
@@ -182,26 +191,60 @@ impl fmt::Display for Changes {
     }
 }
 
-/// What `new` says differently from `old`. The texts of the new tables say why a row was taken away.
+/// What `new` says differently from `old`.
 #[must_use]
-pub fn changes(old: &Mapping, new: &Mapping, texts: &TableTexts) -> Changes {
+pub fn changes(old: &Mapping, new: &Mapping) -> Changes {
     let mut list = Vec::new();
-    compare(&facts(old), &facts(new), texts, &mut list);
+    compare(&facts(old), &facts(new), new, &mut list);
     for family in new.families() {
         let before = old.families().iter().find(|known| known.name == family.name);
         let before = before.map_or(old, |known| &known.mapping);
         let mut own = Vec::new();
-        compare(&cia402(before), &cia402(&family.mapping), texts, &mut own);
+        compare(&cia402::facts(before), &cia402::facts(&family.mapping), &family.mapping, &mut own);
         own.retain(|change| !list.contains(change));
         for change in &mut own {
             change.row.push_str(&format!(", {}", family.name));
         }
         list.extend(own);
     }
+    // No key should be left out above. One that is must not look like no change.
+    if list.is_empty() && old.meaning() != new.meaning() {
+        list.push(unnamed(new));
+    }
     Changes { list }
 }
 
-fn compare(old: &[Fact<'_>], new: &[Fact<'_>], texts: &TableTexts, list: &mut Vec<Change>) {
+/// A change of which no row is known.
+fn unnamed(new: &Mapping) -> Change {
+    Change {
+        aspect: Aspect::Other,
+        table: "all",
+        row: "tables".to_owned(),
+        before: Some("one meaning".to_owned()),
+        after: Some("another meaning, by rows that are not compared".to_owned()),
+        factor: None,
+        place: (new.tables().cip_generic.text.path().to_owned(), 1),
+        dangerous: true,
+        accepted: None,
+    }
+}
+
+/// The text of a table, with what is laid over it.
+fn source<'m>(mapping: &'m Mapping, table: &str) -> Option<&'m Source> {
+    let tables = mapping.tables();
+    let sources = [
+        ("cip-generic", &tables.cip_generic.text),
+        ("generic-sercos", &tables.generic_sercos.text),
+        ("generic-cia402", &tables.generic_cia402.text),
+        ("generic", &tables.generic.text),
+        ("cip-attributes", &tables.cip_attributes.text),
+        ("sercos-idns", &tables.sercos_idns.text),
+        ("cia402-objects", &tables.cia402_objects.text),
+    ];
+    sources.into_iter().find(|(name, _)| *name == table).map(|(_, source)| &**source)
+}
+
+fn compare(old: &[Fact<'_>], new: &[Fact<'_>], mapping: &Mapping, list: &mut Vec<Change>) {
     let same = |one: &Fact<'_>, other: &Fact<'_>| {
         (one.table, one.list, &one.id, one.aspect) == (other.table, other.list, &other.id, other.aspect)
     };
@@ -216,8 +259,21 @@ fn compare(old: &[Fact<'_>], new: &[Fact<'_>], texts: &TableTexts, list: &mut Ve
     }
     for fact in old.iter().filter(|fact| !new.iter().any(|known| same(known, fact))) {
         let mut change = change(fact, Some(fact), None);
-        change.accepted = taken_away(fact, texts);
+        let taken = source(mapping, fact.table).and_then(|new| new.accepts_loss(fact.source, &fact.span));
+        change.accepted = taken.map(str::to_owned);
         list.push(change);
+    }
+}
+
+/// Whether a new row comes before rows that are there, or beside them into the drive.
+fn wins(new: &Fact<'_>) -> bool {
+    match new.aspect {
+        Aspect::State | Aspect::Fault | Aspect::Step => true,
+        Aspect::Scale => new.list == "scaling",
+        Aspect::Mode => new.table == "generic-cia402",
+        // A row for some modes of operation wins over the one for all others.
+        Aspect::Sign | Aspect::Binding => new.list == "signal" && new.id.contains(" in "),
+        _ => false,
     }
 }
 
@@ -243,27 +299,9 @@ fn change(at: &Fact<'_>, before: Option<&Fact<'_>>, after: Option<&Fact<'_>>) ->
         after: says(after),
         factor: numbers.map(|(before, after)| after / before).filter(|factor| *factor != 1.0),
         place: (file.to_owned(), line),
-        // A new row can come before those that are there.
-        dangerous: dangerous || before.is_none() && matches!(at.aspect, Aspect::State | Aspect::Fault),
+        dangerous: dangerous || before.is_none() && wins(at),
         accepted: None,
     }
-}
-
-/// The reason in the row of an overlay that takes a row, or keys of it, away.
-fn taken_away(fact: &Fact<'_>, texts: &TableTexts) -> Option<String> {
-    // A row is identified by more than one key at times; the first one is in all of them.
-    let names = [fact.id.as_str(), fact.id.split(", ").next()?, fact.id.split(' ').next()?];
-    let list = format!("{}.{}", fact.table, fact.list);
-    texts.overlays.iter().find_map(|overlay| {
-        let source = Source::new(&overlay.path, &overlay.text);
-        let heads = |at: usize| overlay.text[..at].lines().rfind(|line| line.starts_with('['));
-        let of_list = |at: usize| heads(at).is_some_and(|head| head.trim_matches(['[', ']', ' ']) == list);
-        names.iter().find_map(|name| {
-            let named = format!("\"{name}\"");
-            let mut places = overlay.text.match_indices(&named).filter(|(at, _)| of_list(*at));
-            places.find_map(|(at, found)| source.accepts(&(at..at + found.len())).map(str::to_owned))
-        })
-    })
 }
 
 struct Reader<'m> {
@@ -322,6 +360,10 @@ impl<'m> Reader<'m> {
         for row in rows {
             let id = format!("{} ({})", row.unit.get_ref(), row.quantity.get_ref());
             self.scale(("unit", &id), &row.generic_per_unit, 0, "");
+            let over = if row.reciprocal { "one over it" } else { "itself" };
+            let says =
+                format!("{over}, times {}, spelt {}", text(row.times.as_ref()), row.texts.join(" or "));
+            self.say(("unit", &id), Aspect::Unit, says, row.unit.span());
         }
     }
 }
@@ -347,174 +389,21 @@ fn flag(name: &str, value: Option<bool>) -> String {
 }
 
 fn facts(mapping: &Mapping) -> Vec<Fact<'_>> {
-    let mut facts = cip(mapping);
+    let mut facts = cip::facts(mapping);
     facts.extend(vendor::facts(mapping));
-    facts.extend(sercos(mapping));
-    facts.extend(cia402(mapping));
+    facts.extend(sercos::facts(mapping));
+    facts.extend(cia402::facts(mapping));
     facts
 }
 
-fn cip(mapping: &Mapping) -> Vec<Fact<'_>> {
-    let file = &mapping.tables().cip_generic;
-    let rows = &file.rows;
-    let mut reader = Reader::new(&file.text, "cip-generic");
-    reader.units(&rows.unit);
-    for row in &rows.displacement_unit {
-        let ratio = Spanned::new(row.nanounits.span(), [*row.nanounits.get_ref(), 1]);
-        reader.scale(("displacement_unit", row.code.get_ref()), &ratio, 0, "");
-    }
-    for row in &rows.cyclic {
-        reader.named(("cyclic", row.element.get_ref()), Aspect::Binding, &row.signal);
-        reader.named(("cyclic", row.element.get_ref()), Aspect::Missing, &row.missing);
-    }
-    for row in &rows.mode {
-        reader.named(("mode", row.control_mode.get_ref()), Aspect::Mode, &row.mode);
-    }
-    for row in &rows.request {
-        let says = format!("{}, {}", text(row.request.as_ref()), row.axis_response.get_ref());
-        reader.say(("request", row.axis_control.get_ref()), Aspect::State, says, row.axis_control.span());
-    }
-    for row in &rows.drive_action {
-        let says = text(row.request.as_ref());
-        reader.say(
-            ("drive_action", row.drive_action.get_ref()),
-            Aspect::State,
-            says,
-            row.drive_action.span(),
-        );
-    }
-    for row in &rows.state {
-        let says = format!("{}: {}", row.axis_state.get_ref(), listed(&row.conditions));
-        reader.say(("state", row.state.get_ref()), Aspect::State, says, row.axis_state.span());
-    }
-    for row in &rows.fault {
-        let named = [&row.exception, &row.node_fault, &row.initialization, &row.apr];
-        let named = named.into_iter().flatten().next();
-        let (least, default) = (text(row.least.as_ref()), text(row.default.as_ref()));
-        let bit = row.manufacturer.as_ref().map(|bit| format!("manufacturer {}", bit.get_ref()));
-        let says = format!("{}, least {least}, default {default}", bit.as_deref().unwrap_or(text(named)));
-        reader.say(("fault", row.cause.get_ref()), Aspect::Fault, says, row.cause.span());
-    }
-    for row in &rows.reaction {
-        let says = format!("{}, {}", row.stop.get_ref(), row.state_change.get_ref());
-        reader.say(("reaction", row.reaction.get_ref()), Aspect::Fault, says, row.reaction.span());
-    }
-    for row in &rows.stopping {
-        let says = format!("{}, holds {}, {}", row.method.get_ref(), row.holds, row.abort.get_ref());
-        reader.say(
-            ("stopping", row.stopping_action.get_ref()),
-            Aspect::Fault,
-            says,
-            row.stopping_action.span(),
-        );
-    }
-    for row in &rows.attribute {
-        let id = ("attribute", row.attribute.get_ref().as_str());
-        let named = [&row.parameter, &row.signal, &row.served_by];
-        let named = text(named.into_iter().flatten().next());
-        let value = row.value.map_or_else(String::new, |value| format!(" {value}"));
-        reader.say(id, Aspect::Binding, format!("{named}{value}"), row.attribute.span());
-        if let Some(missing) = &row.missing {
-            reader.named(id, Aspect::Missing, missing);
-        }
-        reader.range(id, row.range, row.attribute.span());
-    }
-    reader.facts
-}
-
-fn sercos(mapping: &Mapping) -> Vec<Fact<'_>> {
-    let file = &mapping.tables().generic_sercos;
-    let rows = &file.rows;
-    let mut reader = Reader::new(&file.text, "generic-sercos");
-    reader.units(&rows.unit);
-    for row in &rows.scaling {
-        let name = row.scaling.get_ref();
-        if let Some(load) = &row.load {
-            let [motor, turns] = [0, 1].map(|at: usize| load.gear[at].get_ref());
-            let says = format!("gear {motor}/{turns}, feed {}", text(row.feed.as_ref()));
-            reader.say(("scaling", name), Aspect::Scale, says, load.gear[0].span());
-        }
-        for method in &row.methods {
-            let id = format!("{name}, {}", method.name);
-            let idns =
-                [&method.factor_idn, &method.exponent_idn, &method.divisor_idn].map(|idn| text(idn.as_ref()));
-            let divisor = method.divisor.map_or_else(String::new, |divisor| format!(" / {divisor}"));
-            let more = format!(
-                "{divisor}, by {}, type {:#04x}/{:#04x}",
-                idns.join(" "),
-                method.pattern[0],
-                method.pattern[1]
-            );
-            let exponent = method.exponent.unwrap_or_default();
-            let fact = reader.scale(("scaling", &id), &method.base, exponent, &more);
-            if let Some(divisor) = method.divisor {
-                let by = quotient(1, divisor);
-                fact.number = fact.number.zip(by).map(|(number, by)| number * by);
-            }
-        }
-    }
-    let sign = |polarity: &crate::format::PolarityRow| {
-        format!("{} bit {}", polarity.idn.get_ref(), polarity.bit.get_ref())
-    };
-    let direction = &rows.direction.polarity;
-    reader.say(("direction", "axis"), Aspect::Sign, sign(direction), direction.bit.span());
-    for row in &rows.signal {
-        let id = ("signal", row.signal.get_ref().as_str());
-        let polarity = row.polarity.as_ref();
-        let says = polarity.map_or_else(|| "never inverted".to_owned(), sign);
-        reader.say(id, Aspect::Sign, says, span(polarity.map(|polarity| &polarity.bit), &row.signal));
-        reader.named(id, Aspect::Binding, &row.idn);
-        reader.named(id, Aspect::Missing, &row.missing);
-    }
-    for row in &rows.mode {
-        let id = format!(
-            "{}, by the {}",
-            row.mode.get_ref(),
-            row.interpolation.as_ref().map_or("controller", |name| name.get_ref())
-        );
-        let says = format!("{}; {}; {}", listed(&row.codes), listed(&row.command), listed(&row.actual));
-        reader.say(("mode", &id), Aspect::Mode, says, row.mode.span());
-        reader.named(("mode", &id), Aspect::Missing, &row.missing);
-    }
-    for row in &rows.action {
-        let says = format!(
-            "{} {}, command {}",
-            text(row.send.as_ref()),
-            pattern(&row.pattern),
-            text(row.command.as_ref())
-        );
-        reader.say(("action", row.action.get_ref()), Aspect::State, says, row.action.span());
-    }
-    for row in &rows.report {
-        let id = format!(
-            "{}{}{}",
-            pattern(&row.pattern),
-            flag("acknowledges", row.acknowledges),
-            flag("procedure", row.procedure)
-        );
-        reader.named(("report", &id), Aspect::State, &row.report);
-    }
-    for row in &rows.status {
-        let id = format!(
-            "{}, {}{}",
-            row.status.get_ref(),
-            pattern(&row.pattern),
-            flag("acknowledges", row.acknowledges)
-        );
-        reader.say(("status", &id), Aspect::State, row.word.get_ref(), row.status.span());
-    }
-    for row in &rows.fault {
-        let id = format!("{}, {}", row.word.get_ref(), pattern(&row.pattern));
-        let says = format!("{}, reaction {}", row.cause.get_ref(), text(row.reaction.as_ref()));
-        reader.say(("fault", &id), Aspect::Fault, says, row.cause.span());
-    }
-    for row in &rows.parameter {
-        parameter(&mut reader, &row.parameter, &row.idn, row.factor.as_ref());
-    }
-    reader.facts
-}
-
-fn parameter(reader: &mut Reader<'_>, name: &Name, place: &Name, factor: Option<&RatioRow>) {
+/// A parameter of a drive: its place, its scale, and what else the row says of it.
+fn parameter(
+    reader: &mut Reader<'_>,
+    name: &Name,
+    place: &Name,
+    factor: Option<&RatioRow>,
+    (direction, missing): (&Name, Option<&Name>),
+) {
     let id = ("parameter", name.get_ref().as_str());
     reader.named(id, Aspect::Binding, place);
     let one = Spanned::new(name.span(), [1, 1]);
@@ -522,106 +411,13 @@ fn parameter(reader: &mut Reader<'_>, name: &Name, place: &Name, factor: Option<
     if fact.number.is_some_and(|number| number < 0.0) {
         fact.says.push_str(" (turned)");
     }
+    reader.named(("parameter", &format!("{}, direction", id.1)), Aspect::Binding, direction);
+    // `reject` is what happens without the key.
+    let says = missing.map_or("reject", |missing| missing.get_ref());
+    reader.say(id, Aspect::Missing, says, span(missing, name));
 }
 
-fn cia402(mapping: &Mapping) -> Vec<Fact<'_>> {
-    let file = &mapping.tables().generic_cia402;
-    let rows = &file.rows;
-    let mut reader = Reader::new(&file.text, "generic-cia402");
-    reader.units(&rows.unit);
-    for row in &rows.scaling {
-        for method in &row.methods {
-            let id = format!("{}, {}", row.unit.get_ref(), method.name);
-            let more = format!(
-                ", times {}, over {}, like {}",
-                listed(&method.times),
-                listed(&method.over),
-                text(method.like.as_ref())
-            );
-            match &method.base {
-                Some(base) => reader.scale(("scaling", &id), base, 0, &more),
-                None => {
-                    let says = more.trim_start_matches(", ");
-                    reader.say(("scaling", &id), Aspect::Scale, says, row.unit.span())
-                }
-            };
-        }
-    }
-    let words = &rows.words;
-    reader.named(("words", "direction"), Aspect::Sign, &words.direction);
-    for (key, name) in [
-        ("control", &words.control),
-        ("status", &words.status),
-        ("mode", &words.mode),
-        ("mode_shown", &words.mode_shown),
-        ("polarity", &words.polarity),
-    ] {
-        reader.named(("words", key), Aspect::Binding, name);
-    }
-    let drive = &rows.drive;
-    let says = format!("acknowledges {}, voltage bit {}", drive.acknowledges, drive.voltage_bit.get_ref());
-    reader.say(("drive", "usual"), Aspect::State, says, drive.voltage_bit.span());
-    for row in &rows.signal {
-        let modes = if row.modes.is_empty() { String::new() } else { format!(" in {}", listed(&row.modes)) };
-        let id = format!("{}{modes}", row.signal.get_ref());
-        let says = row.polarity.as_ref().map_or("never inverted", |name| name.get_ref());
-        reader.say(("signal", &id), Aspect::Sign, says, span(row.polarity.as_ref(), &row.signal));
-        reader.named(("signal", &id), Aspect::Binding, &row.object);
-        reader.named(("signal", &id), Aspect::Missing, &row.missing);
-    }
-    for row in &rows.mode {
-        let by = row.interpolation.as_ref().map_or("controller", |name| name.get_ref());
-        let id = format!("{}, by the {by}, {}", row.mode.get_ref(), listed(&row.modes));
-        let says = format!("{}; {}; {}", pattern(&row.control), listed(&row.command), listed(&row.actual));
-        reader.say(("mode", &id), Aspect::Mode, says, row.mode.span());
-        reader.named(("mode", &id), Aspect::Missing, &row.missing);
-    }
-    for row in &rows.action {
-        let id = format!(
-            "{}, in {}",
-            row.action.get_ref(),
-            row.when.as_ref().map_or("every state", |name| name.get_ref())
-        );
-        let says = format!("{} {}", text(row.send.as_ref()), pattern(&row.pattern));
-        reader.say(("action", &id), Aspect::State, says, row.action.span());
-    }
-    for row in &rows.report {
-        let modes = listed(&row.modes);
-        let id = format!(
-            "{} {} {modes}{}{}",
-            row.state.get_ref(),
-            pattern(&row.pattern),
-            flag("follows", row.follows),
-            flag("voltage", row.voltage)
-        );
-        reader.named(("report", &id), Aspect::State, &row.report);
-    }
-    for row in &rows.status {
-        let state = row.state.as_ref().map_or("", |name| name.get_ref());
-        let id = format!(
-            "{}, {state} {} {}{}{}",
-            row.status.get_ref(),
-            pattern(&row.pattern),
-            listed(&row.modes),
-            flag("follows", row.follows),
-            flag("voltage", row.voltage)
-        );
-        reader.say(("status", &id), Aspect::State, row.object.get_ref(), row.status.span());
-    }
-    for row in &rows.fault {
-        let says = format!("{}, reaction {}", row.cause.get_ref(), text(row.reaction.as_ref()));
-        for name in &row.codes {
-            reader.say(("fault", name.get_ref()), Aspect::Fault, says.clone(), name.span());
-        }
-    }
-    for row in &rows.fault_class {
-        let says = format!("{}, reaction {}", row.cause.get_ref(), text(row.reaction.as_ref()));
-        for name in &row.classes {
-            reader.say(("fault_class", name.get_ref()), Aspect::Fault, says.clone(), name.span());
-        }
-    }
-    for row in &rows.parameter {
-        parameter(&mut reader, &row.parameter, &row.object, row.factor.as_ref());
-    }
-    reader.facts
+/// Whether something is so, if the row says it.
+fn said(name: &str, value: Option<&Name>) -> String {
+    value.map_or_else(String::new, |value| format!(", {name} {}", value.get_ref()))
 }
