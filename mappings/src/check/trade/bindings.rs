@@ -1,17 +1,18 @@
 //! Every generic value is bound to what holds it by the standard.
 
 use super::facts::{
-    ATTRIBUTES, AXIS_STATUS, Binding, CIA402_CAPTURES, CIA402_PROBES, CIA402_PROBING, CIA402_SAMPLES, CYCLIC,
-    CaptureFact, EVENTS, MODE_SLOTS, OF_THE_DRIVE, OF_THE_SERCOS_DRIVE, OPPOSITES, PARAMETERS, PROCEDURES,
-    SERCOS_CAPTURES, SERCOS_PROBES, SERCOS_PROBING, SERCOS_STATUS, SIGNALS, Trigger, WORDS, WRAPPING,
+    ATTRIBUTES, AXIS_STATUS, Binding, CIA402_CAPTURES, CIA402_LIMITS, CIA402_PROBES, CIA402_PROBING,
+    CIA402_SAMPLES, CYCLIC, CaptureFact, EVENTS, LOADS, MODE_SLOTS, OF_MOTOR, OF_THE_DRIVE,
+    OF_THE_SERCOS_DRIVE, OPPOSITES, PARAMETERS, PROCEDURES, SERCOS_CAPTURES, SERCOS_PROBES, SERCOS_PROBING,
+    SERCOS_STATUS, SIGNALS, Trigger, WORDS, WRAPPING,
 };
 use super::{Reporter, is_standard, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
-use crate::finding::registry::{DIRECTION, WRONG_BINDING, WRONG_STATE, WRONG_WRAP};
+use crate::finding::registry::{DIRECTION, WRONG_BINDING, WRONG_SIGN, WRONG_STATE, WRONG_WRAP};
 use crate::format::{
-    CipAttributeRow, CipEventRow, FieldIs, FieldValueRow, ModeSlotRow, Name, ProcedureRow, SercosCaptureRow,
-    SercosStatusRow, StatusRow,
+    Cia402ParameterRow, CipAttributeRow, CipEventRow, FieldIs, FieldValueRow, ModeSlotRow, Name,
+    ProcedureRow, SercosCaptureRow, SercosStatusRow, StatusRow,
 };
 
 /// Which of the places of a binding.
@@ -31,6 +32,8 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
     }
     for row in &rows.signal {
         bound(&mut reporter, SIGNALS, row.signal.get_ref(), ("idn", &row.idn), places, true);
+        let load = row.load.as_ref().map(|load| &load.idn);
+        of_load(&mut reporter, (&row.signal, &row.idn), load, places);
     }
     for row in &rows.parameter {
         bound(&mut reporter, PARAMETERS, row.parameter.get_ref(), ("idn", &row.idn), places, false);
@@ -54,9 +57,14 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     }
     for row in &file.rows.signal {
         bound(&mut reporter, SIGNALS, row.signal.get_ref(), ("object", &row.object), places, true);
+        // No axis goes by the encoder of its load in the modes that have rows of their own.
+        if row.modes.is_empty() || row.load.is_some() {
+            of_load(&mut reporter, (&row.signal, &row.object), row.load.as_ref(), places);
+        }
     }
     for row in &file.rows.parameter {
         bound(&mut reporter, PARAMETERS, row.parameter.get_ref(), ("object", &row.object), places, false);
+        limits(&mut reporter, row);
         let more = [("inverted", &row.inverted), ("common", &row.common)];
         for (key, object) in more {
             let Some(object) = object else { continue };
@@ -68,6 +76,65 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
             bound(&mut reporter, PARAMETERS, &name, (key, object), places, false);
         }
     }
+}
+
+/// What a limit of one direction needs besides its object: the object of the other direction, for drives that invert their
+/// positions, and that of both directions, for drives that have no other.
+fn limits(reporter: &mut Reporter<'_>, row: &Cia402ParameterRow) {
+    let (name, object) = (row.parameter.get_ref(), row.object.get_ref());
+    let Some((_, inverted, common)) = CIA402_LIMITS.iter().find(|(known, ..)| known == object) else {
+        return;
+    };
+    for (code, key, given, right, without) in [
+        (
+            WRONG_SIGN,
+            "inverted",
+            &row.inverted,
+            inverted,
+            "in a drive that inverts its positions the limits of both directions would be exchanged",
+        ),
+        (WRONG_BINDING, "common", &row.common, common, "a drive that has no other limit would get none"),
+    ] {
+        if given.is_none() {
+            let what = [
+                format!("`{name}` has no `{key}`"),
+                format!("expected {right}: {without}"),
+                format!("write `{key} = \"{right}\"`"),
+            ];
+            reporter.report(code, ("parameter", row.parameter.span()), what);
+        }
+    }
+}
+
+/// A value by the encoder of the load, of an axis that goes by that one.
+fn of_load(
+    reporter: &mut Reporter<'_>,
+    (signal, place): (&Name, &Name),
+    given: Option<&Name>,
+    places: Places,
+) {
+    let name = signal.get_ref();
+    let right = LOADS.iter().find(|fact| fact.name == name).and_then(|fact| places(fact).first().copied());
+    let what = match (given.map(|given| given.get_ref().as_str()), right) {
+        (Some(given), _) if !is_standard(given) || right == Some(given) => return,
+        (Some(given), Some(right)) => [
+            format!("`{name}` by the encoder of the load is bound to {given}"),
+            format!("the encoder of the load has it in {right}"),
+            format!("write {right} in `load`"),
+        ],
+        (Some(given), None) => [
+            format!("`{name}` by the encoder of the load is bound to {given}"),
+            "it is the same by either encoder".to_owned(),
+            "remove `load`".to_owned(),
+        ],
+        (None, Some(right)) if OF_MOTOR.contains(&place.get_ref().as_str()) => [
+            format!("`{name}` has no value by the encoder of the load"),
+            format!("an axis that goes by that encoder would get {}, that of the motor", place.get_ref()),
+            format!("write {right} in `load`"),
+        ],
+        (None, _) => return,
+    };
+    reporter.report(WRONG_BINDING, place_of("load", given, ("signal", signal)), what);
 }
 
 /// The name of the same value in the other direction.

@@ -1,11 +1,13 @@
 //! The words of CIP Motion: what a request asks for, and what a state is shown as.
 
-use super::facts::{AXIS_STATES, CONTROL_MODES, DRIVE_ACTIONS, REQUESTS, STOPPINGS};
+use super::facts::{
+    AXIS_STATES, CONTROL_MODES, DRIVE_ACTIONS, FEEDBACK_MODES, REQUESTS, SEQUENCE, STOPPINGS,
+};
 use super::{Reporter, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
-use crate::finding::registry::{REQUEST_LOST, WRONG_ORDER, WRONG_STATE};
-use crate::format::Name;
+use crate::finding::registry::{REQUEST_LOST, WRONG_BINDING, WRONG_ORDER, WRONG_STATE};
+use crate::format::{Name, SequenceRow};
 
 pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().cip_generic;
@@ -55,6 +57,67 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
             format!("write `mode = \"{mode}\"`"),
         ];
         reporter.report(WRONG_STATE, ("mode", row.mode.span()), what);
+    }
+    for row in &rows.feedback_mode {
+        let fact = FEEDBACK_MODES.iter().find(|(known, _)| known == row.feedback_mode.get_ref());
+        let Some((name, feedback)) = fact.filter(|(_, right)| right != row.feedback.get_ref()) else {
+            continue;
+        };
+        let what = [
+            format!("`{name}` would be taken by an axis with `feedback = \"{}\"`", row.feedback.get_ref()),
+            format!("expected `{feedback}`: the encoders that the controller has set up"),
+            format!("write `feedback = \"{feedback}\"`"),
+        ];
+        reporter.report(WRONG_STATE, ("feedback", row.feedback.span()), what);
+    }
+    sequence(&mut reporter, &rows.sequence);
+}
+
+/// The attributes that start and stop an axis.
+fn sequence(reporter: &mut Reporter<'_>, row: &SequenceRow) {
+    let SequenceRow {
+        stopping_action,
+        stopping_time_limit,
+        coasting_time_limit,
+        brake_release_delay,
+        brake_engage_delay,
+        zero_speed,
+        zero_speed_time,
+        ramp_velocity_positive,
+        ramp_velocity_negative,
+        ramp_acceleration,
+        ramp_deceleration,
+        deceleration_limit,
+        flying_start,
+        overtravel_checking,
+        source: _,
+    } = row;
+    // In the order of the facts.
+    let given: [&Name; SEQUENCE.len()] = [
+        stopping_action,
+        stopping_time_limit,
+        coasting_time_limit,
+        brake_release_delay,
+        brake_engage_delay,
+        zero_speed,
+        zero_speed_time,
+        ramp_velocity_positive,
+        ramp_velocity_negative,
+        ramp_acceleration,
+        ramp_deceleration,
+        deceleration_limit,
+        flying_start,
+        overtravel_checking,
+    ];
+    for ((key, right), given) in
+        SEQUENCE.iter().zip(given).filter(|((_, right), given)| given.get_ref() != right)
+    {
+        let what = [
+            format!("`{key}` would follow the attribute `{}`", given.get_ref()),
+            format!("expected `{right}`: the controller sets that one"),
+            format!("write `{key} = \"{right}\"`"),
+        ];
+        reporter.report(WRONG_BINDING, (key, given.span()), what);
     }
 }
 

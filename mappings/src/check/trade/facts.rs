@@ -110,6 +110,20 @@ pub(super) const SIGNALS: &[Binding] = &[
     bound("digital_inputs", &[], &["60FD:00"]),
 ];
 
+/// Cyclic values by the encoder of the load. All others are the same by either encoder.
+pub(super) const LOADS: &[Binding] = &[
+    bound("position_actual", &["S-0-0053"], &["60E4:01"]),
+    bound("velocity_actual", &["S-0-0156"], &["60E5:01"]),
+];
+
+/// Values of the encoder of the motor that an axis needs of that of its load, if it goes by that one. On SERCOS the velocity of the
+/// load is derived from its positions.
+pub(super) const OF_MOTOR: &[&str] = &["S-0-0051", "6064:00", "606C:00"];
+
+/// Limits of one direction by their object: that of the other direction, and that of both.
+pub(super) const CIA402_LIMITS: &[(&str, &str, &str)] =
+    &[("60E0:00", "60E1:00", "6072:00"), ("60E1:00", "60E0:00", "6072:00")];
+
 /// Parameters.
 pub(super) const PARAMETERS: &[Binding] = &[
     bound("position_limit_positive", &["S-0-0049"], &["607D:02"]),
@@ -353,6 +367,28 @@ pub(super) const CONTROL_MODES: &[(&str, &str)] = &[
     ("Velocity Control", "velocity"),
     ("Acceleration Control", "acceleration"),
     ("Torque Control", "torque"),
+];
+
+/// Feedback Mode of CIP Motion (Table 5-2.34), and by which encoders an axis goes in it.
+pub(super) const FEEDBACK_MODES: &[(&str, &str)] =
+    &[("Motor Feedback", "motor"), ("Load Feedback", "load"), ("Dual Feedback", "dual")];
+
+/// The attributes of the start and stop sequences (5-2.3.9.1, 5-2.3.4, 5-2.6.5.4), by the key that names each.
+pub(super) const SEQUENCE: &[(&str, &str)] = &[
+    ("stopping_action", "Stopping Action"),
+    ("stopping_time_limit", "Stopping Time Limit"),
+    ("coasting_time_limit", "Coasting Time Limit"),
+    ("brake_release_delay", "Mechanical Brake Release Delay"),
+    ("brake_engage_delay", "Mechanical Brake Engage Delay"),
+    ("zero_speed", "Velocity Standstill Window"),
+    ("zero_speed_time", "Zero Speed Time"),
+    ("ramp_velocity_positive", "Ramp Velocity - Positive"),
+    ("ramp_velocity_negative", "Ramp Velocity - Negative"),
+    ("ramp_acceleration", "Ramp Acceleration"),
+    ("ramp_deceleration", "Ramp Deceleration"),
+    ("deceleration_limit", "Deceleration Limit"),
+    ("flying_start", "Flying Start Enable"),
+    ("overtravel_checking", "Hardware Overtravel Input Checking"),
 ];
 
 /// Cyclic elements of CIP Motion (Tables 6-2.19 to 6-2.22).
@@ -1100,6 +1136,19 @@ pub(super) const SERCOS_CODES: &[(&str, bool, &[&str])] = &[
         &[
             "Drive controlled interpolation, feedback 1, lagless",
             "Drive controlled interpolation, feedback 1",
+        ],
+    ),
+];
+
+/// The same where the encoder of the load closes the position loop. The other modes have none.
+pub(super) const SERCOS_LOAD_CODES: &[(&str, bool, &[&str])] = &[
+    ("position", false, &["Position control, feedback 2, lagless", "Position control, feedback 2"]),
+    (
+        "position",
+        true,
+        &[
+            "Drive controlled interpolation, feedback 2, lagless",
+            "Drive controlled interpolation, feedback 2",
         ],
     ),
 ];

@@ -3,11 +3,12 @@
 use profile_generic::program::BitPattern;
 use profile_generic::state::Report;
 
-use super::facts::{SERCOS_CODES, SERCOS_MODES};
+use super::facts::{SERCOS_CODES, SERCOS_LOAD_CODES, SERCOS_MODES};
 use super::{Reporter, is_standard, place_of};
 use crate::Mapping;
 use crate::finding::Findings;
 use crate::finding::registry::{WEAKER_REACTION, WRONG_ORDER, WRONG_STATE};
+use crate::format::Name;
 use crate::sercos::tables::{ReportRule, StatusRule};
 
 // S-0-0135, Drive status.
@@ -238,30 +239,55 @@ fn modes(mapping: &Mapping, reporter: &mut Reporter<'_>) {
         let known =
             SERCOS_MODES.iter().find(|(mode, drive, _)| mode == row.mode.get_ref() && *drive == by_drive);
         let Some((mode, _, begin)) = known else { continue };
-        let codes = SERCOS_CODES.iter().find(|(known, drive, _)| known == mode && *drive == by_drive);
-        let given: Vec<&str> = row.codes.iter().map(|code| code.get_ref().as_str()).collect();
-        let of_fact = |codes: &[&str]| given.iter().all(|code| codes.contains(code));
-        if let Some((_, _, codes)) = codes.filter(|(_, _, codes)| of_fact(codes) && given != *codes) {
-            let listed: Vec<String> = codes.iter().map(|code| format!("\"{code}\"")).collect();
-            let what = [
-                format!("the operating mode `{mode}` selects its codes in another order, or not all of them"),
-                format!("expected {}: the first that the drive takes counts", listed.join(", ")),
-                format!("write `codes = [{}]`", listed.join(", ")),
-            ];
-            reporter.report(WRONG_STATE, ("mode", row.mode.span()), what);
-        }
-        for code in &row.codes {
-            let name = code.get_ref();
-            let of_another =
-                SERCOS_MODES.iter().any(|(_, _, other)| other != begin && name.starts_with(other));
-            if of_another {
+        let [motor, load] = [SERCOS_CODES, SERCOS_LOAD_CODES].map(|facts| {
+            let own = facts.iter().find(|(known, drive, _)| known == mode && *drive == by_drive);
+            own.map_or(&[][..], |(_, _, codes)| *codes)
+        });
+        let row_of = ("mode", row.mode.span());
+        for (key, codes, right, other) in
+            [("codes", &row.codes, motor, &[][..]), ("load_codes", &row.load_codes, load, motor)]
+        {
+            let given: Vec<&str> = codes.iter().map(|code| code.get_ref().as_str()).collect();
+            if given != right && given.iter().all(|code| right.contains(code)) {
+                let listed: Vec<String> = right.iter().map(|code| format!("\"{code}\"")).collect();
                 let what = [
-                    format!("the operating mode `{mode}` would select `{name}` in the drive"),
-                    format!("expected a mode that begins with `{begin}`"),
-                    "name the operation mode of the drive that does the same".to_owned(),
+                    format!(
+                        "the operating mode `{mode}` selects its {key} in another order, or not all of them"
+                    ),
+                    format!("expected {}: the first that the drive takes counts", listed.join(", ")),
+                    format!("write `{key} = [{}]`", listed.join(", ")),
                 ];
-                reporter.report(WRONG_STATE, ("codes", code.span()), what);
+                reporter.report(WRONG_STATE, row_of.clone(), what);
+            }
+            for code in codes {
+                selected(reporter, (key, code), (mode, begin), (right, other));
             }
         }
     }
+}
+
+/// An operation mode that an operating mode selects: one of another operating mode, or of the encoder of the motor in its place.
+fn selected(
+    reporter: &mut Reporter<'_>,
+    (key, code): (&str, &Name),
+    (mode, begin): (&str, &str),
+    (right, other): (&[&str], &[&str]),
+) {
+    let name = code.get_ref();
+    let of_another = SERCOS_MODES.iter().any(|(_, _, other)| *other != begin && name.starts_with(other));
+    let (expected, help) = if of_another {
+        (
+            format!("expected a mode that begins with `{begin}`"),
+            "name the operation mode of the drive that does the same".to_owned(),
+        )
+    } else if !right.is_empty() && other.contains(&name.as_str()) {
+        (
+            "it closes the position loop over the encoder of the motor".to_owned(),
+            format!("name that of the encoder of the load, such as `{}`", right[0]),
+        )
+    } else {
+        return;
+    };
+    let what = [format!("the operating mode `{mode}` would select `{name}` in the drive"), expected, help];
+    reporter.report(WRONG_STATE, (key, code.span()), what);
 }

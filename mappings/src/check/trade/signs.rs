@@ -24,40 +24,54 @@ pub(super) fn sercos(mapping: &Mapping, findings: &mut Findings) {
         reporter.report(WRONG_SIGN, ("polarity", direction.bit.span()), what);
     }
     for row in &file.rows.signal {
-        let idn = row.idn.get_ref();
-        let Some(SercosSign { polarity, bit, .. }) = SERCOS_SIGNS.iter().find(|sign| sign.idn == idn) else {
-            continue;
-        };
-        let help = format!("write `polarity = {{ idn = \"{polarity}\", bit = {bit} }}`");
-        let signal = row.signal.get_ref();
-        match &row.polarity {
-            None => {
-                let what = [
-                    format!("`{signal}` has no polarity"),
-                    format!(
-                        "bit {bit} of {polarity} inverts {idn} in the drive: a drive that has it set would turn the other way"
-                    ),
-                    help,
-                ];
-                reporter.report(WRONG_SIGN, ("signal", row.signal.span()), what);
-            }
-            Some(given) if is_standard(given.idn.get_ref()) && !is(given, (polarity, *bit)) => {
-                let what = [
-                    format!("`{signal}` has the polarity of another value"),
-                    format!(
-                        "bit {bit} of {polarity} inverts {idn}, not bit {} of {}",
-                        given.bit.get_ref(),
-                        given.idn.get_ref()
-                    ),
-                    help,
-                ];
-                reporter.report(WRONG_SIGN, ("polarity", given.bit.span()), what);
-            }
-            Some(_) => {}
+        let name = &row.signal;
+        polarity(&mut reporter, name, ("signal", name), &row.idn, row.polarity.as_ref());
+        if let Some(load) = &row.load {
+            polarity(&mut reporter, name, ("load", &load.idn), &load.idn, load.polarity.as_ref());
         }
     }
     for row in &file.rows.parameter {
         magnitude(&mut reporter, &row.parameter, &row.idn, row.factor.as_ref());
+    }
+}
+
+/// The polarity of a signal by one of the encoders. `missing` is where one that is not there is reported.
+fn polarity(
+    reporter: &mut Reporter<'_>,
+    signal: &Name,
+    missing: (&str, &Name),
+    idn: &Name,
+    given: Option<&PolarityRow>,
+) {
+    let (signal, idn) = (signal.get_ref(), idn.get_ref());
+    let Some(SercosSign { polarity, bit, .. }) = SERCOS_SIGNS.iter().find(|sign| sign.idn == idn) else {
+        return;
+    };
+    let help = format!("write `polarity = {{ idn = \"{polarity}\", bit = {bit} }}`");
+    match given {
+        None => {
+            let what = [
+                format!("`{signal}` has no polarity"),
+                format!(
+                    "bit {bit} of {polarity} inverts {idn} in the drive: a drive that has it set would turn the other way"
+                ),
+                help,
+            ];
+            reporter.report(WRONG_SIGN, (missing.0, missing.1.span()), what);
+        }
+        Some(given) if is_standard(given.idn.get_ref()) && !is(given, (polarity, *bit)) => {
+            let what = [
+                format!("`{signal}` has the polarity of another value"),
+                format!(
+                    "bit {bit} of {polarity} inverts {idn}, not bit {} of {}",
+                    given.bit.get_ref(),
+                    given.idn.get_ref()
+                ),
+                help,
+            ];
+            reporter.report(WRONG_SIGN, ("polarity", given.bit.span()), what);
+        }
+        Some(_) => {}
     }
 }
 

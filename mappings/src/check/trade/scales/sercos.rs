@@ -11,7 +11,7 @@ use super::{TOLERANCE, measures, units};
 use crate::dictionary::SercosDictionary;
 use crate::finding::Findings;
 use crate::finding::registry::{WRONG_SCALE, WRONG_SHAFT};
-use crate::format::{SercosScalingRow, UnitRow};
+use crate::format::{Name, ScalingMethodRow, SercosScalingRow, UnitRow};
 use crate::sercos::scaling::{AxisUnits, Rated, ScalingRule, ScalingSource};
 use crate::{DriveFacts, Mapping, Reference};
 
@@ -34,6 +34,11 @@ const SERCOS: &[(&str, &str, &str, &str)] = &[
     ("torque", "S-0-0086", "S-0-0093", "S-0-0094"),
     ("temperature", "S-0-0208", "", ""),
 ];
+
+/// How a position wraps: bit 7 of its scaling type, the range, and what divides the range.
+const MODULO: ([u32; 2], &str, &str) = ([0x80, 0x80], "S-0-0103", "S-0-0294");
+/// The resolution of rotary positions.
+const TURN_COUNTS: &str = "S-0-0079";
 
 /// Newton metre in an inch pound of force, newton in a pound of force.
 const INCH_POUND: f64 = 0.112_984_829_027_616_7;
@@ -188,6 +193,10 @@ pub(in super::super) fn check(mapping: &Mapping, findings: &mut Findings) {
         let Some((name, word, factor, exponent)) = SERCOS.iter().find(|(known, ..)| *known == name) else {
             continue;
         };
+        modulo(&mut reporter, row);
+        for method in &row.methods {
+            expected(&mut reporter, method, (factor, exponent));
+        }
         // A gear that is turned round makes every method wrong: the cause is enough.
         if shafts(&mut reporter, row) || other_word(&mut reporter, row, word) {
             continue;
@@ -201,6 +210,61 @@ pub(in super::super) fn check(mapping: &Mapping, findings: &mut Findings) {
         };
         scaling.methods(&mut reporter);
     }
+}
+
+/// Where positions wrap, and nothing else does.
+fn modulo(reporter: &mut Reporter<'_>, row: &SercosScalingRow) {
+    let name = row.scaling.get_ref();
+    let (pattern, range, divider) = MODULO;
+    let wraps = name == "position";
+    let of_vendor = |given: &Name| !is_standard(given.get_ref());
+    let same = |given: &Name, right: &str| given.get_ref() == right || of_vendor(given);
+    let fits = row.modulo.as_ref().map(|given| {
+        let divided = given.divider.as_ref().is_some_and(|given| same(given, divider));
+        given.pattern == pattern && same(&given.range, range) && (divided || of_vendor(&given.range))
+    });
+    if fits.unwrap_or(!wraps) && (wraps || fits.is_none()) {
+        return;
+    }
+    let what = if wraps {
+        [
+            format!("the {name} wraps somewhere else than in the drive"),
+            format!("bit 7 of the scaling type says that it wraps, at {range}, which {divider} divides"),
+            format!(
+                "write `modulo = {{ pattern = [{:#04x}, {:#04x}], range = \"{range}\", divider = \"{divider}\" }}`",
+                pattern[0], pattern[1]
+            ),
+        ]
+    } else {
+        [format!("the {name} wraps"), "only positions wrap".to_owned(), "remove `modulo`".to_owned()]
+    };
+    let given = row.modulo.as_ref().map(|given| &given.range);
+    reporter.report(WRONG_SCALE, place_of("modulo", given, ("scaling", &row.scaling)), what);
+}
+
+/// What a method that fixes its factors holds a drive to: one that shows others counts by those.
+fn expected(reporter: &mut Reporter<'_>, method: &ScalingMethodRow, (factor, exponent): (&str, &str)) {
+    // Neither rotary nor linear: no parameter of the drive is about it.
+    if method.kind.is_none() {
+        return;
+    }
+    let mut right: Vec<(&str, i64)> = Vec::new();
+    right.extend(method.divisor.map(|divisor| (TURN_COUNTS, divisor)));
+    right.extend(method.exponent.iter().flat_map(|power| [(factor, 1), (exponent, i64::from(*power))]));
+    let given: Vec<(&str, i64)> =
+        method.expect.iter().map(|(idn, value)| (idn.get_ref().as_str(), *value)).collect();
+    if right.iter().all(|one| given.contains(one)) {
+        return;
+    }
+    let listed: Vec<String> = right.iter().map(|(idn, value)| format!("[\"{idn}\", {value}]")).collect();
+    let what = [
+        format!("the method `{}` takes a drive whose parameters say something else", method.name),
+        "a drive of a preferential scaling shows the factors that it counts by, and those are fixed"
+            .to_owned(),
+        format!("write `expect = [{}]`", listed.join(", ")),
+    ];
+    let place = method.expect.first().map_or(("base", method.base.span()), |(idn, _)| ("expect", idn.span()));
+    reporter.report(WRONG_SCALE, place, what);
 }
 
 /// Whether each spelling of element 4 stands with its unit.
