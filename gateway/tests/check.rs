@@ -125,3 +125,42 @@ fn changes_against_the_shipped_tables_are_told_by_meaning() {
     let output = check(&["--mappings", overlay, "--diff", overlay]);
     assert_eq!(output.status.code(), Some(0), "{}", out(&output));
 }
+
+/// The tables of a configuration that cannot be read are not known, so that nothing can be said of what they change.
+#[test]
+fn tables_of_a_configuration_that_cannot_be_read_are_not_compared() {
+    let folder = std::env::temp_dir().join(format!("axisbridge-diff-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("empty")).unwrap();
+    let shipped = include_str!("../../examples/two-axes-in-process.toml");
+    let overlay = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/diff/line-4.toml");
+    let config = folder.join("config.toml");
+    let path = config.to_str().unwrap();
+    for (tables, said) in [
+        ("[mapping]\n".to_owned(), "error[AX0006]"),
+        (format!("[mappings]\noverlays = \"{overlay}\"\n"), "error[AX0005]"),
+    ] {
+        std::fs::write(&config, format!("{shipped}\n{tables}")).unwrap();
+        let output = check(&["--config", path, "--diff"]);
+        assert_eq!(output.status.code(), Some(1), "{}", out(&output));
+        assert!(out(&output).contains(said), "{}", out(&output));
+        assert!(out(&output).ends_with("the tables cannot be compared\n"), "{}", out(&output));
+    }
+    let missing = check(&["--config", "no-such-file.toml", "--diff"]);
+    assert_eq!((missing.status.code(), out(&missing).contains("error[AX0001]")), (Some(1), true));
+    let json = check(&["--config", "no-such-file.toml", "--diff", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out(&json)).unwrap();
+    assert_eq!(json["errors"], 1);
+    // A configuration that can be read is compared, whatever is found in its tables.
+    std::fs::write(&config, format!("{shipped}\n[mappings]\noverlays = [\"{overlay}\"]\n")).unwrap();
+    let output = check(&["--config", path, "--diff", overlay]);
+    assert_eq!(
+        (output.status.code(), out(&output).as_str()),
+        (Some(0), "0 changes, 0 dangerous, 0 not acknowledged\n")
+    );
+    // A folder without overlays is none to compare with.
+    let empty = folder.join("empty");
+    let output = check(&["--diff", empty.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(1), "{}", out(&output));
+    assert!(out(&output).contains("files whose names end in .toml"), "{}", out(&output));
+    std::fs::remove_dir_all(folder).unwrap();
+}

@@ -78,7 +78,9 @@ fn changes(
         Some(old) if TableTexts::replaces(old) => Mapping::load(Some(old), &[]),
         Some(old) => Mapping::load(None, &[old.to_owned()]),
     };
-    let (Ok(before), Some(mapping)) = (&before, &outcome.tables.mapping) else {
+    // Of a configuration that cannot be read nobody knows the tables.
+    let read = arguments.config.is_none() || outcome.config.is_some();
+    let (Ok(before), Some(mapping), true) = (&before, &outcome.tables.mapping, read) else {
         let mut findings = outcome.tables.findings.clone();
         findings.extend(before.err().unwrap_or_default());
         findings.retain(|finding| finding.severity() == Severity::Error);
