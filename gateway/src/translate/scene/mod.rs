@@ -97,7 +97,7 @@ pub fn names(config: &Config) -> Names {
 
 /// Plays a scene and returns its text. The controller is that of the device with the address `target` of the script, else of the first
 /// one; it connects when a client of local control has given its orders. The events count from the moment at which the buses are in
-/// operation. When the controller is at its end, the box is stopped.
+/// operation, or should have been. When the controller is at its end, the box is stopped.
 ///
 /// # Errors
 /// [`SceneError`]. A step that fails is part of the text.
@@ -116,7 +116,12 @@ pub fn play(
     while scene.now < end && !scene.is_ready() {
         scene.step();
     }
-    scene.recording.say(scene.now, "the buses are in operation");
+    let said = if scene.is_ready() {
+        "the buses are in operation"
+    } else {
+        "not every bus is in operation, and the scene goes on without"
+    };
+    scene.recording.say(scene.now, said);
     scene.block();
     scene.player = Some(Player::new(names(config), events, scene.now));
     if !orders.is_empty() {
