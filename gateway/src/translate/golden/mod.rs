@@ -17,8 +17,9 @@ const FILES: [(&str, &str); 3] = [
     ("cia402.facts", include_str!("cia402.facts")),
     ("devicenet.facts", include_str!("devicenet.facts")),
 ];
-const CONFIGS: [(&str, &str); 3] = [
+const CONFIGS: [(&str, &str); 4] = [
     ("sercos.toml", include_str!("sercos.toml")),
+    ("sercos-load.toml", include_str!("sercos-load.toml")),
     ("cia402.toml", include_str!("cia402.toml")),
     ("devicenet.toml", include_str!("devicenet.toml")),
 ];
