@@ -128,16 +128,24 @@ impl Judge {
 
     /// The facts are shown by the boxes of these configurations: another one shows others.
     fn config(&self, place: usize, text: &str) -> Noticed {
-        let facts = FACTS[place];
-        let (name, shipped) = facts.configs[place];
+        let (name, shipped) = FACTS[0].configs[place];
         let (Ok(config), Ok(before)) = (Config::parse(text, name), Config::parse(shipped, name)) else {
             return Noticed::Check;
         };
         if format!("{config:?}") == format!("{before:?}") {
             return Noticed::Same;
         }
-        let changed = Facts { configs: &[(name, text)], ..facts };
-        if !changed.check(&self.mapping, 1).expect("the facts of the program").1.is_empty() {
+        let configs: Vec<_> = FACTS[0]
+            .configs
+            .iter()
+            .map(|(known, other)| (*known, if *known == name { text } else { other }))
+            .collect();
+        let named = format!("config {name}\n");
+        let fails = |facts: &Facts<'_>| {
+            let changed = Facts { configs: &configs, ..*facts };
+            !changed.check(&self.mapping, 1).expect("the facts of the program").1.is_empty()
+        };
+        if FACTS.iter().filter(|facts| facts.text.contains(&named)).any(fails) {
             return Noticed::Frame;
         }
         let sent = |config: &Config| Sent::of(config, &self.mapping);
