@@ -57,7 +57,7 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     }
     for row in &file.rows.signal {
         bound(&mut reporter, SIGNALS, row.signal.get_ref(), ("object", &row.object), places, true);
-        // No axis goes by the encoder of its load in the modes that have rows of their own.
+        // A row for some modes of operation may have none, as that of drives without an encoder (vl).
         if row.modes.is_empty() || row.load.is_some() {
             of_load(&mut reporter, (&row.signal, &row.object), row.load.as_ref(), places);
         }
