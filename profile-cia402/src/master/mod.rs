@@ -496,14 +496,13 @@ impl Master {
     }
 
     /// Tells once per boot that two devices seem to have one node-id.
-    fn tell_duplicate(&mut self, index: usize, sign: DuplicateSign) -> bool {
+    fn tell_duplicate(&mut self, index: usize, sign: DuplicateSign) {
         let station = &mut self.stations[index];
         if station.signs.contains(&sign) || station.signs.try_push(sign).is_err() {
-            return false;
+            return;
         }
         let node = station.node;
         self.emit(Event::DuplicateNode { node, sign });
-        true
     }
 }
 

@@ -183,9 +183,10 @@ impl Master {
         Ok(())
     }
 
-    /// Two devices obey one node-id: both are stopped.
+    /// Two devices obey one node-id: both are stopped, whether this was reported before or not.
     fn duplicate(&mut self, now: MonotonicTime, index: usize, sign: DuplicateSign) {
-        if self.tell_duplicate(index, sign) {
+        self.tell_duplicate(index, sign);
+        if !self.stations[index].state.is_out() {
             self.stations[index].failed = None;
             self.fail(now, index, None);
             self.stations[index].nmt = Some(NmtCommand::STOP);

@@ -53,8 +53,7 @@ impl Master {
                 let keep = node.keep_alive && last == BootState::Off;
                 station.nmt = (!keep).then_some(NmtCommand::RESET_COMMUNICATION);
                 (station.status, station.kept, station.heartbeat) = (None, false, None);
-                station.signs.clear();
-                (station.strays, station.last_answer) = (0, None);
+                station.forget_duplicate();
                 // One that may stay in operation reports its state when it is asked, and has to be asked from then on.
                 station.guard_at = node.guarding.filter(|_| keep).map(|_| now);
                 station.deadline = Some(now + config.boot_up_time);
@@ -66,6 +65,10 @@ impl Master {
                 (station.configured, station.nmt) = (false, None);
                 if event == BootEvent::BootUp {
                     (station.kept, station.status) = (false, None);
+                    if last == BootState::Failed {
+                        // It begins anew, and so does the search for a second device.
+                        station.forget_duplicate();
+                    }
                 }
                 // One that was reset has its time since then.
                 station.give_up = station.give_up.or(config.gives_up_at(now));

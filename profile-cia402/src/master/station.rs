@@ -242,6 +242,12 @@ impl Station {
         }
     }
 
+    /// Nothing of a second device with the same node-id was seen yet.
+    pub fn forget_duplicate(&mut self) {
+        self.signs.clear();
+        (self.strays, self.last_answer) = (0, None);
+    }
+
     /// No PDO is valid any more.
     pub fn stop_ends(&mut self) {
         self.tpdos.iter_mut().for_each(TpdoEnd::stop);

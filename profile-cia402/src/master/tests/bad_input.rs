@@ -416,14 +416,24 @@ fn two_devices_with_one_node_id_send_twice() {
     other.objects.values = rig.device(1).objects.values.clone();
     other.state = NmtState::OPERATIONAL;
     rig.devices.push(other);
-    rig.until("duplicate", |rig| rig.saw(&Event::DuplicateNode { node: id(1), sign: DuplicateSign::Pdos }));
+    let failures = |rig: &Rig| {
+        rig.count(|event| matches!(event, Event::BootFailed { node, .. } if *node == id(1)))
+    };
+    let states = |rig: &Rig| -> Vec<NmtState> {
+        let both = rig.devices.iter().filter(|device| device.node == id(1));
+        both.map(|device| device.state).collect()
+    };
+    let duplicate = Event::DuplicateNode { node: id(1), sign: DuplicateSign::Pdos };
+    rig.until("duplicate", |rig| rig.saw(&duplicate));
     rig.run_ms(1);
-    assert!(
-        rig.devices
-            .iter()
-            .filter(|device| device.node == id(1))
-            .all(|device| device.state == NmtState::STOPPED)
-    );
+    assert_eq!((failures(&rig), states(&rig)), (1, vec![NmtState::STOPPED; 2]));
+    // One of them starts again. It comes up, and the start reaches both.
+    let now = rig.now;
+    rig.device(1).reset(now);
+    rig.until("operation", |rig| rig.saw(&Event::Operational { node: id(1) }));
+    rig.run_ms(40);
+    assert_eq!((failures(&rig), states(&rig)), (2, vec![NmtState::STOPPED; 2]), "{:?}", rig.log);
+    assert_eq!(rig.count(|event| *event == duplicate), 2);
     rig.runs(&[2]);
 }
 
