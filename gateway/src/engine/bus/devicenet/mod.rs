@@ -117,6 +117,8 @@ pub struct DevicenetBus {
     /// The drive of each axis.
     places: Places<usize>,
     cycles_seen: u64,
+    /// Number of the cycle that began last, counted with those that were left out: its place on the grid.
+    on_grid: u64,
     /// Messages of drives that did not count.
     refused: u64,
     commissioner: CommissionerHandle<ListWork>,
@@ -169,6 +171,7 @@ impl DevicenetBus {
             places: Places::new(drives.iter().enumerate().map(|(place, drive)| (drive.plan.axis, place))),
             drives,
             cycles_seen: 0,
+            on_grid: 0,
             refused: 0,
             commissioner,
             direct: DirectSlot::new(),
@@ -197,7 +200,7 @@ impl DevicenetBus {
 
     /// Takes what the drives have answered in the cycle that has ended.
     fn gather(&mut self) {
-        let cycle = self.master.statistics().cycles;
+        let cycle = self.on_grid;
         for drive in &mut self.drives {
             drive.fresh = false;
             let consumer = self.master.consumer(drive.plan.mac, POLL).filter(|consumer| consumer.fresh);
@@ -636,7 +639,11 @@ impl South for DevicenetBus {
         let SouthPort::Can(port) = port else { return sent };
         let cycles = self.master.statistics().cycles;
         sent.failures = self.exchange(|link, node| link.send(now, *port, node));
-        sent.cycle = self.master.statistics().cycles != cycles;
+        let statistics = self.master.statistics();
+        sent.cycle = statistics.cycles != cycles;
+        if sent.cycle {
+            self.on_grid = statistics.cycles + statistics.skipped;
+        }
         sent
     }
 
