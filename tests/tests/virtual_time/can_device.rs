@@ -16,6 +16,7 @@ use profile_cia402::node::Node;
 use profile_cia402::node::drive::Device;
 use profile_cia402::wire::nmt::NmtState;
 use profile_cia402::wire::{Mux, NodeId};
+use profile_generic::can::{Frame, Id};
 
 const BOX: &str = include_str!("can.toml");
 
@@ -206,6 +207,27 @@ fn modes_that_the_drive_does_not_tell_are_tried() {
     goes(&mut rig);
     assert_eq!(told(&rig, "tried by 6060"), 0);
     assert_eq!(number(&mut rig, 0x6060, 0), 7, "{}", rig.told());
+}
+
+/// The answer to a write is lost, and the read-back that is already under way comes before the write is repeated.
+#[test]
+fn a_read_back_counts_that_came_after_its_write() {
+    const ANSWERS: Id = Id::Standard(0x581);
+    let mut rig = Rig::new(settings("", ""));
+    let mut lost = false;
+    // The drive answers success and keeps 1 ms.
+    rig.can[0].tamper = Some(Box::new(move |_, frame| {
+        if frame.id() == ANSWERS && frame.data().starts_with(&[0x60, 0xC2, 0x60, 1]) {
+            return std::mem::replace(&mut lost, true);
+        }
+        if frame.id() == ANSWERS && frame.data().starts_with(&[0x4F, 0xC2, 0x60, 1]) {
+            *frame = Frame::new(ANSWERS, &[0x4F, 0xC2, 0x60, 1, 1, 0, 0, 0]).expect("a frame");
+        }
+        true
+    }));
+    rig.run_until(millis(20_000), "the bus up", |rig| rig.status().state == BoxState::READY);
+    let text = "node 1 expects set-points every 1 ms (60C2), and they come every 4 ms";
+    assert_eq!(told(&rig, text), 1, "{}", rig.told());
 }
 
 /// What 6502 does not name is not used, and what it is told with its value.

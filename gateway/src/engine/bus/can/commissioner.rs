@@ -88,9 +88,9 @@ pub struct DeviceWork {
     /// The axis that is being set up, and what is done with it; `None` when nothing is.
     at: Option<(usize, Task)>,
     facts: ObjectFacts,
-    /// Steps that are to come, and those that were sent, in order.
-    steps: VecDeque<ObjectStep>,
-    sent: VecDeque<ObjectStep>,
+    /// Steps that are to come, and those that were sent, in order; each with whether it is repeated.
+    steps: VecDeque<(ObjectStep, bool)>,
+    sent: VecDeque<(ObjectStep, bool)>,
     passed_over: Vec<StepFailure>,
     /// The last question got no answer, and is asked once more.
     asked_again: bool,
@@ -188,7 +188,7 @@ impl Work for DeviceWork {
             };
         }
         let Some(place) = self.at.as_ref().map(|(place, _)| *place) else { return };
-        let Some(step) = self.sent.pop_front() else { return };
+        let Some((step, repeated)) = self.sent.pop_front() else { return };
         let (object, what, must) = match &step {
             ObjectStep::Read { object, fail } => (*object, "reading", *fail),
             ObjectStep::Write { object, fail, .. } => (*object, "writing", *fail),
@@ -199,9 +199,9 @@ impl Work for DeviceWork {
                 self.asked_again = false;
             }
             // A frame was lost, or the drive was busy: once more. What is written here is the same the second time.
-            Err(SdoFailure::Timeout { .. }) if !self.asked_again => {
+            Err(SdoFailure::Timeout { .. }) if !self.asked_again && !repeated => {
                 self.asked_again = true;
-                self.steps.push_front(step);
+                self.repeat(step, object);
             }
             Err(failure) => {
                 if failure.is_absent() {
@@ -285,7 +285,7 @@ impl DeviceWork {
         match context.shared.mapping.of_drive(&self.facts).cia402_steps(plan, &setup.needs, &self.facts) {
             Ok(steps) => {
                 self.at = Some((place, Task::Plan(plan)));
-                self.steps = steps.into();
+                self.steps = steps.into_iter().map(|step| (step, false)).collect();
                 self.advance(context);
             }
             Err(error) => self.fail(place, error.into(), context),
@@ -309,6 +309,17 @@ impl DeviceWork {
         self.axes.get(place).map_or(u8::MAX, |setup| axis_number(setup.axis))
     }
 
+    /// Takes a step again. A read-back that is under way comes before a write that is repeated, and proves nothing: it follows once more.
+    fn repeat(&mut self, step: ObjectStep, object: Object) {
+        if matches!(step, ObjectStep::Write { .. }) {
+            let reads =
+                |step: &ObjectStep| matches!(step, ObjectStep::Read { object: of, .. } if *of == object);
+            let back = self.sent.iter().find(|(step, _)| reads(step));
+            back.into_iter().for_each(|(read, _)| self.steps.push_front((read.clone(), false)));
+        }
+        self.steps.push_front((step, true));
+    }
+
     /// Sends what may be sent, and goes on to the next plan when this one is through.
     fn advance(&mut self, context: &mut Context) {
         if let Some((_, Task::Readback(readback))) = &mut self.at {
@@ -320,7 +331,7 @@ impl DeviceWork {
         }
         while self.sent.len() < WINDOW
             && let Some((place, Task::Plan(_))) = self.at
-            && let Some(step) = self.steps.pop_front()
+            && let Some((step, repeated)) = self.steps.pop_front()
         {
             let Some(request) = request(&step, &self.axes[place].needs) else {
                 // A device without this axis has been told of already, by the axis that it does not have.
@@ -329,7 +340,7 @@ impl DeviceWork {
                 return;
             };
             context.out.push_back(Done::Submit(self.run, request));
-            self.sent.push_back(step);
+            self.sent.push_back((step, repeated));
         }
         let is_through = match &self.at {
             Some((_, Task::Readback(readback))) => readback.under_way() == 0,
