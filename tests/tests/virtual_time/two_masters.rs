@@ -1,15 +1,19 @@
 //! Another master on the wire of the box, before it starts and while its axes move.
 
 use axisbridge::status::BoxState;
-use axisbridge_tests::rig::motion::{at_rest, both, in_motion, millis, moves};
+use axisbridge_tests::rig::motion::{NANO, at_rest, both, in_motion, millis, moves};
 use axisbridge_tests::rig::{Rig, Settings};
-use profile_cip::controller::Step;
+use profile_cip::controller::{AxisSet, Limits, Step};
 use profile_cip::devicenet::wire::{Identifier, MacId};
+use profile_cip::wire::motion::codes::AxisControl;
 use profile_generic::can::{Frame, Id};
 use profile_generic::fault::FaultCause;
+use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 use profile_sercos::master::foreign::LISTEN;
 use profile_sercos::wire::header::{Channel, Header, Kind, Phase, PhaseField, TelegramType};
+
+use super::stopping::request;
 
 const CAN: &str = include_str!("can.toml");
 const DEVICENET: &str = include_str!("devicenet.toml");
@@ -155,6 +159,41 @@ fn somebody_who_sends_sync_beside_the_box_stops_its_axes_and_gets_the_bus() {
     ]);
     let report = rig.run(millis(60_000));
     assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+}
+
+#[test]
+fn an_axis_that_is_enabled_beside_another_master_is_stopped_at_once() {
+    let mut rig = Rig::ready(can_box());
+    let limits = Limits { velocity: 24.0, acceleration: 240.0, jerk: 4_800.0 };
+    rig.connect(vec![Step::Enable(AxisSet::one(2)), Step::MoveAbsolute { axis: 2, position: 500.0, limits }]);
+    rig.run_until(millis(10_000), "the slide in motion", |rig| {
+        let slide = rig.can[0].bus.nodes().nth(1).expect("a device");
+        slide.application().axes()[0].actual().velocity.get() > 47 * NANO / 10
+    });
+    let other = rig.can[0].bus.bus_mut().add(64).expect("the bus has room for another station");
+    rig.can[0].bus.bus_mut().share(Id::Standard(0x080));
+    rig.motion_checker.tolerate("a drive takes one set-point at two SYNCs", |_| true);
+    let begin = rig.now();
+    while rig.engine.axes()[1].state() != DriveState::FaultReaction {
+        assert!(rig.now() - begin < millis(100), "{}", rig.told());
+        send(&mut rig, other, 0x080, &[]);
+        rig.run_for(millis(7));
+    }
+    // The turntable is enabled while the slide still comes to rest.
+    request(&mut rig, AxisControl::ENABLE);
+    let mut enabled = None;
+    while rig.engine.axes()[1].may_have_torque() {
+        rig.step();
+        if rig.engine.axes()[0].state().is_running() {
+            let enabled = *enabled.get_or_insert(rig.now());
+            assert!(rig.now() - enabled < millis(10), "{:?}\n{}", rig.states(0), rig.told());
+        }
+    }
+    assert!(enabled.is_some(), "the slide has stopped too early: {}", rig.told());
+    rig.run_for(millis(100));
+    assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::SOUTH_SILENCE));
+    assert!(rig.torque_free());
+    assert_eq!(count(&rig, "CAN bus 1: nothing is sent until the other master"), 1, "{}", rig.told());
 }
 
 #[test]

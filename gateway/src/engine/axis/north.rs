@@ -230,6 +230,13 @@ impl AxisChannel {
         }
     }
 
+    /// The same in every call as long as the other master is there: an axis that was switched on meanwhile stops as well.
+    pub fn doubt_run(&mut self, now: MonotonicTime, system: SystemTime) {
+        if self.state().is_running() {
+            self.doubt_south(now, system);
+        }
+    }
+
     // ---- set-points --------------------------------------------------------------------------------------------
 
     /// Whether set-points of this number were taken.

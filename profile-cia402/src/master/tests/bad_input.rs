@@ -416,9 +416,8 @@ fn two_devices_with_one_node_id_send_twice() {
     other.objects.values = rig.device(1).objects.values.clone();
     other.state = NmtState::OPERATIONAL;
     rig.devices.push(other);
-    let failures = |rig: &Rig| {
-        rig.count(|event| matches!(event, Event::BootFailed { node, .. } if *node == id(1)))
-    };
+    let failures =
+        |rig: &Rig| rig.count(|event| matches!(event, Event::BootFailed { node, .. } if *node == id(1)));
     let states = |rig: &Rig| -> Vec<NmtState> {
         let both = rig.devices.iter().filter(|device| device.node == id(1));
         both.map(|device| device.state).collect()

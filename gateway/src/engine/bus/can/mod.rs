@@ -558,12 +558,15 @@ impl South for CanBus {
         }
         self.commission(now, axes, notice);
         self.retry(now);
-        let mut drives = self.devices.iter().flat_map(|device| &device.drives);
-        if self.master.leads()
-            && self.master.other_master().is_some()
-            && !drives.any(|drive| axes[drive.axis].may_have_torque())
-        {
-            self.master.give_way(now);
+        if self.master.leads() && self.master.other_master().is_some() {
+            let mut torque = false;
+            for drive in self.devices.iter().flat_map(|device| &device.drives) {
+                axes[drive.axis].doubt_run(now, system);
+                torque |= axes[drive.axis].may_have_torque();
+            }
+            if !torque {
+                self.master.give_way(now);
+            }
         }
         if !self.stopped && self.master.leads() {
             let Self { master, assigner, .. } = self;

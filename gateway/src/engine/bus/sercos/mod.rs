@@ -538,9 +538,13 @@ impl SercosBus {
         let cyclic = self.master.phase() == Some(Phase::CP4);
         let gone = |drive: &Drive| drive.slave.is_none() || self.is_lost(drive);
         let alone = cyclic && self.drives.iter().all(gone) && !self.master.may_recover();
+        let other = cyclic && self.master.other_master().is_some();
+        for drive in self.drives.iter().filter(|_| other) {
+            axes[drive.axis].doubt_run(now, system);
+        }
         let free = cyclic && !axes.iter().any(AxisChannel::may_have_torque);
         let led = |drive: &Drive| axes[drive.axis].may_have_torque();
-        if cyclic && self.master.other_master().is_some() && !self.drives.iter().any(led) {
+        if other && !self.drives.iter().any(led) {
             self.master.give_way(now);
         } else if alone || (free && self.recovery.wants_scan(now)) {
             // Of drives that are all lost nobody knows that they stand.
