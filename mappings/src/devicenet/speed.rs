@@ -119,11 +119,13 @@ fn bit(bit: SpeedStatus) -> BitPattern {
     BitPattern::new(u32::from(bit.bits()), u32::from(bit.bits()))
 }
 
-/// The basic assembly has two bits.
+/// The basic assembly has two bits. In Fault_Stop, in which the drive still brakes, it shows both.
 fn basic_reports() -> Vec<(BitPattern, Report)> {
+    let (faulted, running) = (bit(SpeedStatus::FAULTED), bit(SpeedStatus::RUNNING_FORWARD));
     vec![
-        (bit(SpeedStatus::FAULTED), Report::Faulted),
-        (bit(SpeedStatus::RUNNING_FORWARD), Report::Operating),
+        (BitPattern::new(faulted.mask | running.mask, faulted.value | running.value), Report::FaultReaction),
+        (faulted, Report::Faulted),
+        (running, Report::Operating),
         (BitPattern::new(0, 0), Report::Ready),
     ]
 }

@@ -175,7 +175,9 @@ fn a_velocity_drive_that_somebody_else_leads_is_not_ready() {
         assert_eq!(extended.report(bits | state << 8), report, "{bits:#x} in state {state}");
     }
     let basic = program(false);
-    for (bits, report) in [(0, Report::Ready), (4, Report::Operating), (5, Report::Faulted)] {
+    let cases =
+        [(0, Report::Ready), (1, Report::Faulted), (4, Report::Operating), (5, Report::FaultReaction)];
+    for (bits, report) in cases {
         assert_eq!(basic.report(bits), report, "{bits:#x}");
     }
     let item = Item::attribute(speed::CLASS_SUPERVISOR, speed::FAULT_CODE);
