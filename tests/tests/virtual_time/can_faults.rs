@@ -17,6 +17,7 @@ use profile_generic::can::bus::{Disturbance, Effect, State, Station};
 use profile_generic::can::{Frame, Id};
 use profile_generic::fault::FaultCause;
 use profile_generic::state::DriveState;
+use profile_generic::time::DurationNs;
 
 use super::beside::{Beside, connect};
 
@@ -309,6 +310,36 @@ fn a_tpdo_that_stays_away_stops_its_axis() {
     BUS.runs_again(&mut rig);
     told(&rig, "CAN bus 1: TPDO 1 of node 1 comes again");
     rig.can[0].bus.bus_mut().judge();
+}
+
+/// A TPDO comes at any time of the cycle, and the other bus has the gateway look for it at any time: also between the step of the
+/// axes and SYNC.
+#[test]
+fn a_tpdo_counts_whenever_it_comes_in_the_cycle() {
+    let (first, second) =
+        BOX.split_once("[[south.can.drive]]\nname = \"drive-b\"").expect("the second drive");
+    let bus = "[[south.can]]\ninterface = \"in-process\"\ncycle_time = \"1 ms\"\n\n";
+    let drive = "[[south.can.drive]]\nname = \"drive-b\"";
+    // The step of the turntable is 0.4 ms before SYNC, and in between is that of the slide.
+    let lead = "\n[south.realtime]\nlead = \"400 us\"\n";
+    let mut rig = Rig::ready(Settings::without_line(format!("{first}{bus}{drive}{second}{lead}")));
+    connect(&mut rig, vec![Step::Enable(both()), turn(), Step::Dwell { seconds: 500.0 }]);
+    rig.run_until(millis(10_000), "the turntable in motion", turntable_turns);
+    let (own, device) = (rig.can[0].bus.own_station(), rig.can[0].bus.station(0));
+    for micros in (0..4_000).step_by(50) {
+        let late = Effect::Delay(DurationNs::from_micros(micros));
+        rig.can[0].bus.bus_mut().calm();
+        rig.can[0].bus.bus_mut().disturb(Disturbance::all(late).from(device).to(own));
+        let end = rig.now() + millis(40);
+        while rig.now() < end {
+            rig.step();
+            let axis = &rig.engine.axes()[0];
+            let age = axis.feedback().age_cycles;
+            assert!(age <= 2, "a position of {age} cycles ago with TPDOs {micros} us late\n{}", rig.told());
+            assert_eq!(axis.fault(), None, "{micros}: {}", rig.told());
+        }
+    }
+    assert!(turntable_turns(&rig), "{}", rig.told());
 }
 
 #[test]

@@ -89,9 +89,11 @@ struct Drive {
     axis: usize,
     command: Values,
     feedback: Values,
-    /// Whether every value came in the last cycle, and whether none is lost.
+    /// Whether every value is new, and whether none is lost.
     fresh: bool,
     alive: bool,
+    /// When the values of each TPDO came that were new last: what comes later is new in the cycle after, whatever lies between.
+    taken_at: [Option<MonotonicTime>; PDOS_MAX],
     /// When they came, where a TPDO does not come at SYNC: the oldest of them.
     at: Option<MonotonicTime>,
     accesses: Accesses<Ticket, ACCESSES_MAX>,
@@ -149,6 +151,7 @@ impl CanBus {
             feedback: Values::new(),
             fresh: false,
             alive: false,
+            taken_at: [None; PDOS_MAX],
             at: None,
             accesses: Accesses::new(),
         };
@@ -191,7 +194,8 @@ impl CanBus {
             && self.master.node(device.node).is_some_and(|info| info.state == BootState::Operational)
     }
 
-    /// Puts together what the TPDOs of the cycle that has ended have brought.
+    /// Puts together what the TPDOs have brought since the last cycle. The values of a drive are new once each of its TPDOs has come again:
+    /// those that drives send by timers of their own may come in different cycles. Which ones stay away the master counts.
     fn gather(&mut self) {
         let Self { master, devices, .. } = self;
         for device in devices {
@@ -203,7 +207,13 @@ impl CanBus {
                 let all = consumers.len() == pdo_map.numbers().len() && !consumers.is_empty();
                 let good = |state| matches!(state, ConsumerState::Good | ConsumerState::Missing);
                 drive.alive = all && consumers.iter().all(|consumer| good(consumer.state));
-                drive.fresh = all && consumers.iter().all(|consumer| consumer.fresh);
+                // A TPDO comes at any time: SYNC, before which the axes have done their step, says nothing of whether it is new.
+                let came_at = consumers.iter().map(|consumer| consumer.at);
+                let is_new = |(at, taken): (Option<MonotonicTime>, &_)| at.is_some() && at != *taken;
+                drive.fresh = all && came_at.clone().zip(&drive.taken_at).all(is_new);
+                if drive.fresh {
+                    drive.taken_at.iter_mut().zip(came_at).for_each(|(taken, at)| *taken = at);
+                }
                 let own = consumers.iter().filter(|consumer| !consumer.cyclic);
                 drive.at = own.filter_map(|consumer| consumer.at).min();
                 for part in pdo_map.parts() {
