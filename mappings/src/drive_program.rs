@@ -180,6 +180,9 @@ pub(super) struct StepRow {
     pub when: BitPattern,
     /// Bits of the control.
     pub control: BitPattern,
+    /// Those in their place as long as the drive does not show the mode that it is told: torque in another mode would follow values
+    /// that are meant for no one.
+    pub other_mode: Option<BitPattern>,
 }
 
 /// What is kept of a drive's telegrams from one to the next.
@@ -714,7 +717,11 @@ impl DriveProgram {
         let Order { action, asks, .. } = order;
         let step = self.steps.iter().find(|step| step.action == action && step.when.matches(status));
         let control = match step {
-            Some(step) => step.control.apply(control),
+            Some(step) => {
+                let other =
+                    step.other_mode.filter(|_| told.is_some_and(|entry| !entry.status.matches(status)));
+                other.unwrap_or(step.control).apply(control)
+            }
             None => self.actions.apply(action, control).unwrap_or(control),
         };
         let Some(entry) = told else { return control };

@@ -1,6 +1,8 @@
 //! The program of one axis.
 
 use arrayvec::ArrayVec;
+use profile_cia402::drive::controlword::Command;
+use profile_cia402::drive::{Controlword, State, Statusword};
 use profile_generic::image::{CommandSet, Signal};
 use profile_generic::mode::ModeSelection;
 use profile_generic::parameter::Parameter;
@@ -8,11 +10,12 @@ use profile_generic::program::{BitPattern, Conversion, Field, Width};
 use profile_generic::quantity::Quantity;
 use profile_generic::ratio::Ratio;
 use profile_generic::scaling::UnitKind;
+use profile_generic::state::Action;
 use profile_generic::time::DurationNs;
 
 use super::facts::ObjectFacts;
 use super::{
-    Cia402Tables, DriveMode, FULL_RANGE, Inversion, ModeRule, Object, ParameterAt, ParameterRule,
+    ActionRule, Cia402Tables, DriveMode, FULL_RANGE, Inversion, ModeRule, Object, ParameterAt, ParameterRule,
     ProcedureRule, SignalRule, Value,
 };
 use crate::capture_program::{CaptureMode, Place};
@@ -558,6 +561,24 @@ impl Cia402Tables {
         facts.integer(self.words.polarity, Width::U8).is_some_and(|word| word >> bit & 1 != 0)
     }
 
+    /// What is written instead of a step that puts a drive into operation (transition 4): it stays switched on.
+    fn instead_of_operation(
+        &self,
+        action: Action,
+        when: BitPattern,
+        control: BitPattern,
+    ) -> Option<BitPattern> {
+        let low = |word: u32| u16::try_from(word & 0xFFFF).unwrap_or_default();
+        let command =
+            |pattern: BitPattern| Command::decode(Controlword::from_bits_retain(low(pattern.value)));
+        let state = State::decode(Statusword::from_bits_retain(low(when.value)));
+        let begins =
+            command(control) == Some(Command::EnableOperation) && state != Some(State::OperationEnabled);
+        let stays =
+            |rule: &&ActionRule| rule.action == action && command(rule.pattern) == Some(Command::SwitchOn);
+        self.actions.iter().find(stays).filter(|_| begins).map(|rule| rule.pattern)
+    }
+
     /// Actions, reports and status bits.
     fn words(
         &self,
@@ -569,7 +590,8 @@ impl Cia402Tables {
         for rule in &self.actions {
             match rule.when {
                 Some(when) => {
-                    let row = StepRow { action: rule.action, when, control: rule.pattern };
+                    let other_mode = self.instead_of_operation(rule.action, when, rule.pattern);
+                    let row = StepRow { action: rule.action, when, control: rule.pattern, other_mode };
                     program.steps.try_push(row).map_err(|_| Full("the table of actions"))?;
                 }
                 None => program.actions.set(rule.action, rule.pattern),

@@ -66,11 +66,14 @@ const STATES: [(&str, u32); 8] = [
     ("fault", 0x08),
 ];
 
+/// 6061 shows csp.
+const IN_CSP: u32 = 8 << 16;
+
 #[test]
 fn every_action_in_every_state() {
     let program = program(&ALL);
     let mut text = String::new();
-    for (name, status) in STATES {
+    for (name, status) in STATES.map(|(name, status)| (name, status | IN_CSP)) {
         write!(text, "{name:<24}").unwrap();
         for action in Action::ALL {
             // What stood there before must not matter where an action writes anything.
@@ -92,7 +95,7 @@ fn torque_comes_one_state_at_a_time_and_only_by_enable() {
     let program = program(&ALL);
     for action in Action::ALL {
         for (name, status) in STATES {
-            let control = program.control(*action, OperatingMode::Position.into(), 0, status);
+            let control = program.control(*action, OperatingMode::Position.into(), 0, status | IN_CSP);
             let enabled = control & 0x0F == 0x0F;
             let may = matches!(*action, Action::Enable) && matches!(status, 0x23 | 0x27)
                 || matches!(*action, Action::Halt) && status == 0x27;
@@ -114,13 +117,32 @@ fn a_drive_is_led_from_its_start_into_operation() {
     let program = program(&ALL);
     let (mut status, mut control, mut passed) = (0x40, 0, vec![]);
     for _ in 0..6 {
-        control = program.control(Action::Enable, OperatingMode::Position.into(), control, status);
+        control = program.control(Action::Enable, OperatingMode::Position.into(), control, status | IN_CSP);
         status = next(status, control);
         passed.push(status);
     }
     assert_eq!(passed, [0x21, 0x23, 0x27, 0x27, 0x27, 0x27]);
     let control = program.control(Action::TorqueOff, OperatingMode::Position.into(), control, status);
     assert_eq!(next(status, control), 0x40);
+}
+
+#[test]
+fn a_drive_that_shows_another_mode_stays_switched_on() {
+    let program = program(&ALL);
+    let enable = |mode: OperatingMode, status: u32, shown: u32| {
+        program.control(Action::Enable, mode.into(), 0, status | shown << 16) & 0xFF
+    };
+    for (mode, code) in
+        [(OperatingMode::Position, 8), (OperatingMode::Velocity, 9), (OperatingMode::Torque, 10)]
+    {
+        for shown in [0, 3, 6, 8, 9, 10, 0xFF] {
+            let expected = if shown == code { 0x0F } else { 0x07 };
+            assert_eq!(enable(mode, 0x23, shown), expected, "{mode:?} while {shown} is shown");
+            // A mode is changed in operation, and one that is not shown in time is a fault of the axis.
+            assert_eq!(enable(mode, 0x27, shown), 0x0F, "{mode:?} in operation");
+            assert_eq!(enable(mode, 0x21, shown), 0x07, "{mode:?}");
+        }
+    }
 }
 
 #[test]

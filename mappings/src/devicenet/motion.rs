@@ -222,7 +222,7 @@ fn add_requests(program: &mut DriveProgram, tables: &CipTables) -> Result<(), De
     let of_node = (Action::ResetFault, NODE_FAULTED, Request::FaultReset);
     for (action, when, request) in of_state.into_iter().chain([of_node]) {
         let control = word(action, axis_control(tables, request)?);
-        let step = StepRow { action, when, control };
+        let step = StepRow { action, when, control, other_mode: None };
         program.steps.try_push(step).map_err(|_| Full("the table of actions"))?;
     }
     Ok(())

@@ -16,7 +16,10 @@ use profile_cia402::node::Node;
 use profile_cia402::node::drive::Device;
 use profile_cia402::wire::nmt::NmtState;
 use profile_cia402::wire::{Mux, NodeId};
+use profile_cip::controller::{AxisSet, Step};
 use profile_generic::can::{Frame, Id};
+use profile_generic::fault::FaultCause;
+use profile_generic::state::DriveState;
 
 const BOX: &str = include_str!("can.toml");
 
@@ -207,6 +210,35 @@ fn modes_that_the_drive_does_not_tell_are_tried() {
     goes(&mut rig);
     assert_eq!(told(&rig, "tried by 6060"), 0);
     assert_eq!(number(&mut rig, 0x6060, 0), 7, "{}", rig.told());
+}
+
+/// A drive that never comes to the mode that it was given is not put into operation, and the start ends after its time.
+#[test]
+fn a_drive_that_does_not_show_the_mode_gets_no_torque() {
+    const TPDO: Id = Id::Standard(0x181);
+    let mut rig = Rig::ready(settings("", ""));
+    // Behind the statusword is 6061: cst in place of csp.
+    rig.can[0].tamper = Some(Box::new(|_, frame| {
+        if frame.id() == TPDO {
+            let mut data = frame.data().to_vec();
+            data[2] = 10;
+            *frame = Frame::new(TPDO, &data).expect("a frame");
+        }
+        true
+    }));
+    rig.connect(vec![Step::Enable(AxisSet::one(1))]);
+    rig.run_until(millis(10_000), "the start", |rig| rig.states(0).last() == Some(&DriveState::Starting));
+    let (begun, mut control) = (rig.now(), 0);
+    while rig.engine.axes()[0].state() == DriveState::Starting {
+        control = number(&mut rig, 0x6040, 0);
+        rig.step();
+        let word = number(&mut rig, 0x6041, 0);
+        assert_ne!(word & 0x6F, 0x27, "operation enabled after {}", rig.now() - begun);
+    }
+    assert_eq!(control & 0x0F, 7, "it was switched on and no more");
+    assert!(rig.now() - begun >= millis(10_000), "{}", rig.told());
+    let fault = rig.engine.axes()[0].fault().map(|fault| fault.cause);
+    assert_eq!(fault, Some(FaultCause::START_TIME_OUT), "{}", rig.told());
 }
 
 /// The answer to a write is lost, and the read-back that is already under way comes before the write is repeated.
