@@ -311,6 +311,7 @@ mod tests {
     #[test]
     fn a_can_interface_that_the_user_sets_up_wants_a_queue_and_a_restart() {
         let state = State {
+            index: 3,
             link: LinkState::Up,
             has_bit_rate: true,
             nominal: Some(1_000_000),

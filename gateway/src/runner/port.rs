@@ -175,12 +175,12 @@ pub struct BackOnBus {
 
 impl BackOnBus {
     /// From now on the answer is no.
-    fn ask(&self) {
+    pub(super) fn ask(&self) {
         self.asked.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Whether the last question was answered.
-    fn is_answered(&self) -> bool {
+    pub(super) fn is_answered(&self) -> bool {
         self.asked.load(Ordering::Relaxed) == self.answered.load(Ordering::Acquire)
     }
 
@@ -222,6 +222,12 @@ impl CanSocketPort {
     #[must_use]
     pub fn back(&self) -> Arc<BackOnBus> {
         Arc::clone(&self.back)
+    }
+
+    /// Number of the interface that it is open on.
+    #[must_use]
+    pub const fn index(&self) -> i32 {
+        self.socket.index()
     }
 
     /// The same, with a recording of what goes to and fro.

@@ -77,6 +77,6 @@ pub(crate) fn can_port(
         can_interface::configure(name, &settings)?;
     }
     let port = CanSocketPort::open(name, lock)?.recorded(tap);
-    watches.push(CanWatch::new(name.clone(), *set_bit_rate, port.back()));
+    watches.push(CanWatch::new(name.clone(), port.index(), *set_bit_rate, port.back()));
     Ok(Box::new(port))
 }

@@ -37,6 +37,8 @@ pub struct Settings {
 /// What an interface is set to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct State {
+    /// Its number. An interface that comes in place of one of the same name has another number.
+    pub index: i32,
     /// Whether it is switched on, and on the bus.
     pub link: LinkState,
     /// Whether it is a controller with a bit rate, and not a virtual interface.
@@ -283,6 +285,7 @@ impl<'a> Interface<'a> {
         let can = details.can;
         let rate = |timing: Option<socketcan::nl::CanBitTiming>| timing.filter(|timing| timing.bitrate != 0);
         Ok(State {
+            index: self.index,
             link: link::state(self.socket.as_fd(), self.index, self.name),
             // A virtual interface has no parameters at all.
             has_bit_rate: can.ctrl_mode.is_some() || can.clock.is_some() || can.restart_ms.is_some(),

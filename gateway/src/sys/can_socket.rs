@@ -218,6 +218,12 @@ impl CanSocket {
         &self.name
     }
 
+    /// Number of the interface, to which the socket is bound: it does not follow the name.
+    #[must_use]
+    pub const fn index(&self) -> i32 {
+        self.index
+    }
+
     /// Whether received frames carry the kernel's time stamp.
     #[must_use]
     pub const fn has_time_stamps(&self) -> bool {
