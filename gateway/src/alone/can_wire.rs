@@ -38,7 +38,7 @@ impl CanWire {
             match self.port.receive(now) {
                 Some(CanInput::Frame(frame)) => return Ok(Some(frame)),
                 Some(CanInput::BusOff) => return Err("the interface is off the bus".to_owned()),
-                Some(CanInput::BusOn) => {}
+                Some(CanInput::Transmitted | CanInput::BusOn) => {}
                 None => return Ok(None),
             }
         }

@@ -51,6 +51,8 @@ pub trait EthernetPort {
 pub enum CanInput {
     /// A frame of another station.
     Frame(Frame),
+    /// A frame from the transmit queue has left: the oldest that is in there. Not every port reports this.
+    Transmitted,
     /// The controller is off the bus, or its interface is down.
     BusOff,
     /// The controller is on the bus again.

@@ -214,7 +214,7 @@ impl CanSocketPort {
     /// # Errors
     /// It cannot be opened.
     pub fn open(name: &str, lock: InterfaceLock) -> Result<Self, can_socket::OpenError> {
-        let socket = CanSocket::open(name, &Options::default())?;
+        let socket = CanSocket::open(name, &Options { own: true, ..Options::default() })?;
         Ok(Self { socket, off: false, back: Arc::default(), tap: None, _lock: lock })
     }
 
@@ -256,6 +256,8 @@ impl CanPort for CanSocketPort {
                 Err(_) => return self.go_off(),
             };
             match received.content {
+                // It is in the recording since it was handed over.
+                Content::Frame(_) if received.own => return Some(CanInput::Transmitted),
                 Content::Frame(frame) => {
                     if let Some((tap, bus)) = self.tap.as_mut() {
                         let at = received.at.unwrap_or_else(clock::realtime_now);

@@ -288,6 +288,7 @@ impl<N: CanNode> InProcessCan<N> {
                         node.bus_off(now);
                     }
                 }
+                Output::Sent { from, .. } if from == *own => keep(inbound, CanInput::Transmitted),
                 Output::Sent { .. } | Output::State { .. } => {}
             }
         }

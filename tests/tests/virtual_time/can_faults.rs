@@ -152,6 +152,49 @@ fn a_drive_whose_plug_is_pulled_stops_by_itself() {
     BUS.runs_again(&mut rig);
 }
 
+/// Nobody acknowledges what the gateway sends: its controller repeats one frame until somebody does. What was made meanwhile is old.
+#[test]
+fn old_commands_do_not_leave_when_contact_returns() {
+    let mut rig = in_motion(30.0);
+    let counts = |rig: &Rig| -> Vec<(u64, u64)> {
+        let nodes = rig.can[0].bus.nodes();
+        nodes.map(|node| (node.statistics().syncs, node.statistics().rpdos)).collect()
+    };
+    let plug = |rig: &mut Rig, connected| {
+        let now = rig.now();
+        (0..2).for_each(|device| rig.can[0].bus.connect(now, device, connected));
+    };
+    plug(&mut rig, false);
+    rig.run_for(millis(100));
+    let before = counts(&rig);
+    plug(&mut rig, true);
+    rig.run_for(millis(20));
+    for ((syncs, rpdos), (syncs_before, rpdos_before)) in counts(&rig).into_iter().zip(before) {
+        // What two cycles had left in the queue, what was made since, and five cycles; there are two RPDOs in each.
+        let (syncs, rpdos) = (syncs - syncs_before, rpdos - rpdos_before);
+        assert!((5..=8).contains(&syncs) && rpdos <= 16, "{syncs} SYNCs and {rpdos} RPDOs in five cycles");
+    }
+    // The drives have missed SYNC, and the gateway their answers: nothing moves, and all of it works again.
+    rig.run_for(millis(1_000));
+    for place in 0..2 {
+        assert!(codes(&rig, place).contains(&(FaultType::AXIS_MFG, 17)), "{}", rig.told());
+        assert!(!rig.engine.axes()[place].may_have_torque() && velocity(&rig, place).abs() < NANO / 100);
+    }
+    rig.kill_controller();
+    rig.run_for(millis(5_000));
+    let program = vec![
+        Step::Dwell { seconds: 0.1 },
+        Step::FaultReset(both()),
+        Step::Enable(both()),
+        Step::Together(vec![far(0.0), turn()]),
+        Step::Disable(both()),
+    ];
+    connect(&mut rig, program);
+    rig.run_until(millis(10_000), "both in motion", moving);
+    let report = rig.run(millis(30_000));
+    assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
+}
+
 #[test]
 fn a_drive_that_reboots_stops_its_axis() {
     let mut rig = in_motion(3.0);

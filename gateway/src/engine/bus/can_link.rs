@@ -58,7 +58,7 @@ impl Occupied {
 
 impl CanLink {
     /// Of a bus with this cycle.
-    pub(super) const fn new(cycle_time: DurationNs) -> Self {
+    pub(super) fn new(cycle_time: DurationNs) -> Self {
         Self {
             queue: TransmitQueue::new(cycle_time),
             back: BusReturn::NEVER_LOST,
@@ -107,9 +107,10 @@ impl CanLink {
                         station.handle_frame(now, &frame);
                     }
                 }
+                Some(CanInput::Transmitted) => self.queue.note_transmitted(),
                 Some(CanInput::BusOff) => {
                     if self.back.lose(now) {
-                        self.queue.clear();
+                        self.queue.reset();
                         station.handle_bus_off(now);
                     }
                 }

@@ -1,4 +1,10 @@
 //! The way of a CAN bus's frames into the transmit queue.
+//!
+//! A controller whose frame nobody acknowledges repeats it until somebody does, however long that takes, and what is queued after it
+//! leaves then at once. So no more may be in the transmit queue than what was made in about a cycle. Where the port does not report
+//! what has left, the length of the queue alone limits this.
+
+use std::collections::VecDeque;
 
 use profile_generic::can::Frame;
 use profile_generic::time::{DurationNs, MonotonicTime};
@@ -7,6 +13,15 @@ use crate::engine::port::{CanPort, CanSent};
 
 /// How long a frame waits for room in the transmit queue before it is offered again.
 const FULL_PAUSE: DurationNs = DurationNs::from_micros(200);
+
+/// Longest time from when a frame was handed over until it is reported, where somebody acknowledges: adapters on USB take a while.
+const REPORT_LATEST: DurationNs = DurationNs::from_millis(5);
+
+/// After so long without a frame one more is handed over, although those before it are not known to have left: reports may be lost.
+const PROBE_PAUSE: DurationNs = DurationNs::from_millis(500);
+
+/// Frames of which it is known since when they are in the transmit queue: more than its length.
+const QUEUED_MAX: usize = 256;
 
 /// A frame that waits for room in the transmit queue.
 #[derive(Debug, Clone, Copy)]
@@ -17,17 +32,59 @@ struct Held {
     again: MonotonicTime,
 }
 
+/// The frames in the transmit queue of the port, as far as it reports when one has left.
+#[derive(Debug)]
+struct Queued {
+    /// When each was handed over, the oldest first.
+    since: VecDeque<MonotonicTime>,
+    /// The port reports what has left.
+    is_reported: bool,
+    /// When a frame was handed over last.
+    last: MonotonicTime,
+    /// It was one more than may be in there: the next report is that of a bus that carries frames.
+    is_probe: bool,
+}
+
+impl Queued {
+    /// Whether the oldest is in there for longer than `longest`, so that no other may follow it.
+    fn is_stuck(&mut self, now: MonotonicTime, longest: DurationNs) -> bool {
+        let is_old = self.is_reported && self.since.front().is_some_and(|since| now.since(*since) > longest);
+        let is_probe = is_old && now.since(self.last) > PROBE_PAUSE;
+        self.is_probe |= is_probe;
+        is_old && !is_probe
+    }
+
+    fn pop(&mut self) {
+        self.is_reported = true;
+        if std::mem::take(&mut self.is_probe) {
+            self.since.clear();
+        }
+        self.since.pop_front();
+    }
+
+    fn push(&mut self, now: MonotonicTime) {
+        if self.since.len() == QUEUED_MAX {
+            self.since.pop_front();
+        }
+        self.since.push_back(now);
+        self.last = now;
+    }
+}
+
 /// Hands frames to the transmit queue in their order, and keeps the one for which there is no room.
 #[derive(Debug)]
 pub(super) struct TransmitQueue {
     cycle_time: DurationNs,
     held: Option<Held>,
+    queued: Queued,
 }
 
 impl TransmitQueue {
     /// Of a bus with this cycle: what has waited for longer than one is not sent any more.
-    pub(super) const fn new(cycle_time: DurationNs) -> Self {
-        Self { cycle_time, held: None }
+    pub(super) fn new(cycle_time: DurationNs) -> Self {
+        let since = VecDeque::with_capacity(QUEUED_MAX);
+        let queued = Queued { since, is_reported: false, last: MonotonicTime::ZERO, is_probe: false };
+        Self { cycle_time, held: None, queued }
     }
 
     /// The cycle of the bus.
@@ -43,6 +100,17 @@ impl TransmitQueue {
     /// The frame that waits will not be sent.
     pub(super) const fn clear(&mut self) {
         self.held = None;
+    }
+
+    /// The controller was off the bus: nothing is left of the frames that were handed over.
+    pub(super) fn reset(&mut self) {
+        self.clear();
+        self.queued.since.clear();
+    }
+
+    /// A frame has left.
+    pub(super) fn note_transmitted(&mut self) {
+        self.queued.pop();
     }
 
     /// When the frame that waits is offered again; `None` when none waits.
@@ -67,9 +135,14 @@ impl TransmitQueue {
         if now.since(made) > self.cycle_time {
             return CanSent::Failed;
         }
-        let sent = port.send(now, &frame);
-        if sent == CanSent::Full {
-            self.held = Some(Held { frame, made, again: now + FULL_PAUSE });
+        // What was made for the cycle before has left when this one begins, if anybody acknowledges.
+        let longest = DurationNs(self.cycle_time.as_nanos() / 8 * 7).max(REPORT_LATEST);
+        let is_stuck = self.queued.is_stuck(now, longest);
+        let sent = if is_stuck { CanSent::Full } else { port.send(now, &frame) };
+        match sent {
+            CanSent::Sent => self.queued.push(now),
+            CanSent::Full => self.held = Some(Held { frame, made, again: now + FULL_PAUSE }),
+            CanSent::Failed => {}
         }
         sent
     }
@@ -126,5 +199,56 @@ mod tests {
         transmit_queue.send(us(5_000), &mut queue, frame, us(5_000));
         transmit_queue.clear();
         assert!(transmit_queue.is_empty());
+    }
+
+    /// Two frames in each cycle of so many milliseconds, of which `leave` have left before the next one: how many were taken in each.
+    fn cycles(millis: u64, leave: &[usize]) -> Vec<usize> {
+        let frame = Frame::new(Id::Standard(0x205), &[6, 0]).unwrap();
+        let mut transmit_queue = TransmitQueue::new(DurationNs(i64::try_from(millis * 1_000_000).unwrap()));
+        let mut queue = Queue(Vec::new(), usize::MAX);
+        let mut taken = Vec::new();
+        for (now, leave) in (0..).map(|cycle| us(1_000 + 1_000 * millis * cycle)).zip(leave) {
+            let before = queue.0.len();
+            transmit_queue.clear();
+            (0..2).for_each(|_| _ = transmit_queue.send(now, &mut queue, frame, now));
+            taken.push(queue.0.len() - before);
+            (0..*leave).for_each(|_| transmit_queue.note_transmitted());
+        }
+        taken
+    }
+
+    #[test]
+    fn frames_of_about_a_cycle_wait_for_somebody_who_acknowledges() {
+        assert_eq!(cycles(4, &[2, 2, 2, 2]), [2, 2, 2, 2]);
+        // Nobody acknowledges from the second cycle on, and somebody does again at the end.
+        assert_eq!(cycles(10, &[2, 0, 0, 0, 2, 2]), [2, 2, 0, 0, 0, 2]);
+        assert_eq!(cycles(4, &[2, 0, 0, 0, 4, 2]), [2, 2, 2, 0, 0, 2]);
+        assert_eq!(cycles(1, &[2, 0, 0, 0, 0, 0, 0, 0, 12, 2]), [2, 2, 2, 2, 2, 2, 2, 0, 0, 2]);
+        // A port that does not report what has left.
+        assert_eq!(cycles(4, &[0; 6]), [2; 6]);
+        // A report is late by a cycle; all of a cycle are lost.
+        assert_eq!(cycles(4, &[1, 2, 2, 3, 2]), [2; 5]);
+        assert_eq!(cycles(4, &[2, 0, 2, 2, 2, 2]), [2; 6]);
+        // Where reports are lost, or nobody acknowledges, one frame is tried in half a second, and with its report all is well.
+        let mut lost = [0; 260];
+        lost[0] = 2;
+        let taken = cycles(4, &lost);
+        assert_eq!((taken[127], taken[128], taken[129]), (0, 1, 0));
+        assert_eq!(taken.iter().sum::<usize>(), 6 + 2, "{taken:?}");
+        lost[128] = 1;
+        assert_eq!(cycles(4, &lost)[127..131], [0, 1, 2, 2]);
+    }
+
+    #[test]
+    fn nothing_is_left_in_the_queue_of_a_controller_that_was_off_the_bus() {
+        let frame = Frame::new(Id::Standard(0x205), &[6, 0]).unwrap();
+        let mut transmit_queue = TransmitQueue::new(DurationNs::from_millis(4));
+        let mut queue = Queue(Vec::new(), usize::MAX);
+        transmit_queue.send(us(1_000), &mut queue, frame, us(1_000));
+        transmit_queue.send(us(1_000), &mut queue, frame, us(1_000));
+        transmit_queue.note_transmitted();
+        assert_eq!(transmit_queue.send(us(9_000), &mut queue, frame, us(9_000)), CanSent::Full);
+        transmit_queue.reset();
+        assert_eq!(transmit_queue.send(us(9_000), &mut queue, frame, us(9_000)), CanSent::Sent);
     }
 }

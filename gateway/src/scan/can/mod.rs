@@ -237,7 +237,7 @@ impl Scanner {
             match port.receive(now) {
                 Some(CanInput::Frame(frame)) => self.take(now, &frame),
                 Some(CanInput::BusOff) => return true,
-                Some(CanInput::BusOn) => {}
+                Some(CanInput::Transmitted | CanInput::BusOn) => {}
                 None => break,
             }
         }

@@ -55,7 +55,7 @@ pub(super) struct Tap {
     /// Objects that a node holds in place of its own.
     held: Vec<(u8, Object, Vec<u8>)>,
     /// Answers about these.
-    answers: VecDeque<Frame>,
+    answers: VecDeque<CanInput>,
     pub peers: Vec<Peer>,
 }
 
@@ -153,8 +153,8 @@ impl Tap {
 
 impl CanPort for Tap {
     fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
-        if let Some(frame) = self.answers.pop_front() {
-            return Some(CanInput::Frame(frame));
+        if let Some(answer) = self.answers.pop_front() {
+            return Some(answer);
         }
         let input = self.bus.receive(now)?;
         let CanInput::Frame(frame) = &input else { return Some(input) };
@@ -173,7 +173,7 @@ impl CanPort for Tap {
         let Id::Standard(id) = frame.id() else { return self.bus.send(now, frame) };
         if id & FUNCTION == SDO_REQUEST {
             if let Some(answer) = self.answer(id, frame.data()) {
-                self.answers.push_back(answer);
+                self.answers.extend([CanInput::Transmitted, CanInput::Frame(answer)]);
                 return CanSent::Sent;
             }
             self.hear_sdo(id, frame.data());
