@@ -456,7 +456,7 @@ fn axis_whose_drive_refuses_another_scaling_stays_ready() {
     });
     let inhibits = |bench: &Bench| bench.rig.engine.axes()[0].feedback().inhibits;
     let reply = sercos.say("write turntable S-0-0077 5");
-    let refused = "error write turntable read-only: S-0-0077: the drive refuses the operation data with 0x7005: operation data is \
+    let refused = "error write turntable refused: S-0-0077: the drive refuses the operation data with 0x7005: operation data is \
                    write protected at this time\n";
     assert_eq!(reply, refused);
     sercos.rig.run_for(millis(100));
