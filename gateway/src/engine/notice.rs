@@ -110,6 +110,14 @@ pub enum Notice {
         /// What failed.
         failure: StepFailure,
     },
+    /// A drive that was refused before came through without the commands that were withheld from it; it is left out, and
+    /// commissioned with them at the next attempt.
+    CommandsWithheld {
+        /// Number of the axis: its place in the configuration, from 0.
+        axis: u8,
+        /// The SERCOS address of its drive.
+        address: u16,
+    },
     /// Something has happened to an entry of the start-up list of a drive.
     Startup {
         /// Number of the axis: its place in the configuration, from 0.
@@ -509,6 +517,7 @@ impl Notice {
             | Self::Node { .. } => None,
             Self::DriveMissing { axis, .. }
             | Self::Commissioning { axis, .. }
+            | Self::CommandsWithheld { axis, .. }
             | Self::Startup { axis, .. }
             | Self::StartupFailed { axis, .. }
             | Self::PassedOver { axis, .. }
@@ -561,6 +570,7 @@ impl Notice {
             Self::TimeStep { .. } => "time",
             Self::DriveMissing { .. }
             | Self::Commissioning { .. }
+            | Self::CommandsWithheld { .. }
             | Self::Startup { .. }
             | Self::StartupFailed { .. }
             | Self::PassedOver { .. }
@@ -632,6 +642,11 @@ impl fmt::Display for Notice {
                     "commissioning of the drive with SERCOS address {address} failed: {failure}; it is left out"
                 )
             }
+            Self::CommandsWithheld { address, .. } => write!(
+                f,
+                "the drive with SERCOS address {address} can be commissioned again; its commands, which it was spared since it was refused, are \
+                 executed at the next attempt"
+            ),
             Self::Startup { report, .. } => write!(f, "{report}"),
             Self::StartupFailed { failure, .. } => {
                 write!(f, "the start-up list of the drive failed: {failure}; the drive is left out")

@@ -233,7 +233,7 @@ fn set_points_and_actual_values_go_both_ways() {
     command.set(Signal::VelocityCommand, -1_000_000_000);
     command.set(Signal::TorqueCommand, 500_000);
     let (mut bytes, mut report) = ([0xA5; 13], ConversionReport::default());
-    let control = program.encode(&command, Action::Enable, 0, 0x23, &mut bytes, &mut report);
+    let control = program.encode(&command, Action::Enable, 0, 0x23 | IN_CSP, &mut bytes, &mut report);
     assert!(report.is_clean());
     assert_eq!(control, 0x08_000F);
     // Controlword, mode 8, 900 counts, -3600 counts a second, 500 permille.

@@ -7,9 +7,9 @@ use axisbridge_tests::host::alone_in_real_time;
 
 use super::local::Gateway;
 
-/// Memory that is the process's own, locked, in kB: with the 22 MB of the release program and its libraries that is 64 MB. 16 MB of it are for the
-/// rolling recording and 3 MB for the simulated drives.
-const OWN_MAX_KB: u64 = 42_000;
+/// Memory that is the process's own, locked, in kB. 16 MB of it are for the rolling recording and 3 MB for the simulated drives, which a gateway on a
+/// bus does not have: with the 22 MB of the release program and its libraries it has less than 64 MB.
+const OWN_MAX_KB: u64 = 45_000;
 
 /// Four devices of 16 axes on simulated SERCOS drives, with every server.
 fn configuration() -> String {
@@ -46,8 +46,8 @@ fn configuration() -> String {
 }
 
 #[test]
-fn sixty_four_axes_take_42_mb_at_most() {
-    alone_in_real_time("sixty_four_axes_take_42_mb_at_most", || {
+fn sixty_four_axes_take_45_mb_at_most() {
+    alone_in_real_time("sixty_four_axes_take_45_mb_at_most", || {
         let began = Instant::now();
         let mut gateway = Gateway::with("size", &configuration());
         let mut client = gateway.connect();

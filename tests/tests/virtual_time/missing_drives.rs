@@ -6,6 +6,7 @@ use axisbridge::simulate::drives::{hot_plug_drives, linear};
 use axisbridge_tests::rig::motion::millis;
 use axisbridge_tests::rig::{BOX, Rig, Settings};
 use profile_generic::scaling::UnitKind;
+use profile_generic::state::DriveState;
 use profile_sercos::master::event::Event;
 use profile_sercos::master::station::Presence;
 use profile_sercos::slave::communication::CLASSES_WITH_HOT_PLUG;
@@ -200,4 +201,27 @@ fn no_drive_of_a_ring_is_unheard_for_long_because_another_one_hangs() {
         seen.push(silences.into_iter().max());
     }
     assert!(seen.iter().all(|longest| longest.is_some_and(|cycles| cycles <= 5)), "{seen:?}");
+}
+
+/// A command that the machine relies on, and that the drives do not have.
+const NEEDED: &str = "format = 1\noverlay = \"a command that the machine relies on\"\n[[generic-sercos.commission]]\nphase = 2\ndo = \"command\"\n\
+                      idn = \"S-0-0262\"\nrefused = \"fail\"\nsource = \"drives that start from stored parameters\"\n";
+
+/// A drive that was refused gets no command at the next attempt, and gets through. That is no reason to move it without the command.
+#[test]
+fn a_drive_without_a_command_that_it_has_to_take_is_not_used_at_any_attempt() {
+    let mut rig = Rig::new(Settings { overlays: vec![NEEDED], ..Settings::default() });
+    let failed = "executing S-0-0262";
+    for attempts in 1..4 {
+        rig.run_until(millis(60_000), "an attempt", |rig| {
+            assert!(
+                rig.engine.axes().iter().all(|axis| axis.state() == DriveState::NotReady),
+                "{}",
+                rig.told()
+            );
+            rig.told().matches(failed).count() >= 2 * attempts
+        });
+    }
+    let spared = |notice: &&Notice| matches!(notice, Notice::CommandsWithheld { .. });
+    assert_eq!(rig.notices.iter().filter(spared).count(), 4, "{}", rig.told());
 }

@@ -161,11 +161,34 @@ fn somebody_who_sends_sync_beside_the_box_stops_its_axes_and_gets_the_bus() {
     assert_eq!(report.failure, None, "{}\n{}", rig.log(), rig.told());
 }
 
+/// The slide goes a long way, and the turntable is not used.
+fn slide_alone() -> Vec<Step> {
+    let limits = Limits { velocity: 24.0, acceleration: 240.0, jerk: 4_800.0 };
+    vec![Step::Enable(AxisSet::one(2)), Step::MoveAbsolute { axis: 2, position: 500.0, limits }]
+}
+
+/// The turntable is enabled while the slide still comes to rest for another master. It is stopped at once.
+#[track_caller]
+fn enabled_while_the_slide_stops(rig: &mut Rig) {
+    request(rig, AxisControl::ENABLE);
+    let mut enabled = None;
+    while rig.engine.axes()[1].may_have_torque() {
+        rig.step();
+        if rig.engine.axes()[0].state().is_running() {
+            let enabled = *enabled.get_or_insert(rig.now());
+            assert!(rig.now() - enabled < millis(10), "{:?}\n{}", rig.states(0), rig.told());
+        }
+    }
+    assert!(enabled.is_some(), "the slide has stopped too early: {}", rig.told());
+    rig.run_for(millis(100));
+    assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::SOUTH_SILENCE));
+    assert!(rig.torque_free());
+}
+
 #[test]
 fn an_axis_that_is_enabled_beside_another_master_is_stopped_at_once() {
     let mut rig = Rig::ready(can_box());
-    let limits = Limits { velocity: 24.0, acceleration: 240.0, jerk: 4_800.0 };
-    rig.connect(vec![Step::Enable(AxisSet::one(2)), Step::MoveAbsolute { axis: 2, position: 500.0, limits }]);
+    rig.connect(slide_alone());
     rig.run_until(millis(10_000), "the slide in motion", |rig| {
         let slide = rig.can[0].bus.nodes().nth(1).expect("a device");
         slide.application().axes()[0].actual().velocity.get() > 47 * NANO / 10
@@ -179,20 +202,7 @@ fn an_axis_that_is_enabled_beside_another_master_is_stopped_at_once() {
         send(&mut rig, other, 0x080, &[]);
         rig.run_for(millis(7));
     }
-    // The turntable is enabled while the slide still comes to rest.
-    request(&mut rig, AxisControl::ENABLE);
-    let mut enabled = None;
-    while rig.engine.axes()[1].may_have_torque() {
-        rig.step();
-        if rig.engine.axes()[0].state().is_running() {
-            let enabled = *enabled.get_or_insert(rig.now());
-            assert!(rig.now() - enabled < millis(10), "{:?}\n{}", rig.states(0), rig.told());
-        }
-    }
-    assert!(enabled.is_some(), "the slide has stopped too early: {}", rig.told());
-    rig.run_for(millis(100));
-    assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::SOUTH_SILENCE));
-    assert!(rig.torque_free());
+    enabled_while_the_slide_stops(&mut rig);
     assert_eq!(count(&rig, "CAN bus 1: nothing is sent until the other master"), 1, "{}", rig.told());
 }
 

@@ -123,7 +123,8 @@ impl TransmitQueue {
         self.held.take().map(|held| (held.frame, held.made))
     }
 
-    /// Sends a frame that was made at `made`; with [`CanSent::Full`] it waits, and nothing else is to be sent before it.
+    /// Sends a frame that was made at `made`; with [`CanSent::Full`] it waits, and nothing else is to be sent before it. One behind a
+    /// frame that does not leave is not sent: nobody hears it while it is new.
     pub(super) fn send(
         &mut self,
         now: MonotonicTime,
@@ -137,8 +138,10 @@ impl TransmitQueue {
         }
         // What was made for the cycle before has left when this one begins, if anybody acknowledges.
         let longest = DurationNs(self.cycle_time.as_nanos() / 8 * 7).max(REPORT_LATEST);
-        let is_stuck = self.queued.is_stuck(now, longest);
-        let sent = if is_stuck { CanSent::Full } else { port.send(now, &frame) };
+        if self.queued.is_stuck(now, longest) {
+            return CanSent::Failed;
+        }
+        let sent = port.send(now, &frame);
         match sent {
             CanSent::Sent => self.queued.push(now),
             CanSent::Full => self.held = Some(Held { frame, made, again: now + FULL_PAUSE }),
@@ -247,7 +250,7 @@ mod tests {
         transmit_queue.send(us(1_000), &mut queue, frame, us(1_000));
         transmit_queue.send(us(1_000), &mut queue, frame, us(1_000));
         transmit_queue.note_transmitted();
-        assert_eq!(transmit_queue.send(us(9_000), &mut queue, frame, us(9_000)), CanSent::Full);
+        assert_eq!(transmit_queue.send(us(9_000), &mut queue, frame, us(9_000)), CanSent::Failed);
         transmit_queue.reset();
         assert_eq!(transmit_queue.send(us(9_000), &mut queue, frame, us(9_000)), CanSent::Sent);
     }

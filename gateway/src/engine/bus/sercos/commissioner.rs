@@ -17,7 +17,7 @@ use crate::engine::bus::commissioner::{CommissionerHandle, Context, Done, Run, W
 use crate::engine::bus::startup::{StartupAccess, StartupRun, When};
 use crate::engine::direct::DirectFailure;
 use crate::engine::notice::{Notice, axis_number};
-use crate::mapping::{DriveFacts, DriveProgram, Mapping, SercosAxis, SercosError, Step};
+use crate::mapping::{DriveFacts, DriveProgram, Mapping, Refused, SercosAxis, SercosError, Step};
 use crate::parameter::id::Id;
 use crate::parameter::startup::StartupEntry;
 
@@ -64,6 +64,8 @@ pub struct Setup<T> {
     pub facts: DriveFacts,
     /// The drive was refused for what it is: trying again does not help, and no command is executed in it.
     pub unfit: bool,
+    /// Commands that it has to take were left out of the plan for that reason: a drive that gets through without them is not used yet.
+    withheld: bool,
     /// Values in a row that either end of a connection may miss, S-0-1050.x.11.
     allowed_losses: u16,
     phase: Phase,
@@ -94,6 +96,7 @@ impl<T: Copy + PartialEq> Setup<T> {
             rereads: false,
             facts: DriveFacts::new(),
             unfit: false,
+            withheld: false,
             allowed_losses,
             phase: Phase::CP2,
             plan: None,
@@ -105,6 +108,7 @@ impl<T: Copy + PartialEq> Setup<T> {
     pub fn restart(&mut self, fixed: bool) {
         self.facts = DriveFacts::new();
         self.facts.note_fixed_connections(fixed);
+        self.withheld = false;
         self.passed_over.clear();
         self.startup.restart();
     }
@@ -132,6 +136,8 @@ impl<T: Copy + PartialEq> Setup<T> {
                     plan.steps.retain(|step| matches!(step, Step::Read { .. }));
                 }
                 if self.unfit {
+                    let needed = |step: &Step| matches!(step, Step::Command { refused: Refused::Fail, .. });
+                    self.withheld |= plan.steps.iter().any(needed);
                     plan.steps.retain(|step| !matches!(step, Step::Command { .. }));
                 }
                 self.plan = Some(Commissioning::new(plan));
@@ -243,7 +249,7 @@ impl<T: Copy + PartialEq> Setup<T> {
         let made = if self.phase == Phase::CP2 {
             connections(mapping, &self.needs, &self.facts, self.allowed_losses).map(Progress::Connections)
         } else {
-            self.program(mapping, notice)
+            self.program(mapping, notice).map(|program| self.unless_withheld(program))
         };
         Some(made.unwrap_or_else(|error| {
             self.unfit = true;
@@ -261,6 +267,15 @@ impl<T: Copy + PartialEq> Setup<T> {
             .into_iter()
             .for_each(notice);
         Ok(Progress::Program(Arc::new(program)))
+    }
+
+    /// A drive that was refused and now comes through without its commands is set up once more, with them.
+    fn unless_withheld(&mut self, program: Progress) -> Progress {
+        if !self.withheld {
+            return program;
+        }
+        self.unfit = false;
+        Progress::Failed(Notice::CommandsWithheld { axis: self.axis, address: self.address })
     }
 
     fn misfit(&self, error: SercosError) -> Notice {

@@ -410,7 +410,9 @@ impl SercosBus {
                 }
                 SetupProgress::Connections(connections) => {
                     drive.connections = numbers(&connections);
-                    master.set_connections(slave, connections).is_ok()
+                    let set = master.set_connections(slave, connections).is_ok();
+                    drive.setup.unfit |= !set;
+                    set
                 }
                 SetupProgress::Program(program) => {
                     axes[drive.axis].set_south(program);
@@ -423,7 +425,6 @@ impl SercosBus {
             };
             if !taken {
                 // The others go on without it.
-                drive.setup.unfit = true;
                 let _ = refused.try_push(slave);
                 let _ = master.exclude(slave);
                 drive.lose();
