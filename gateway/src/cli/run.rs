@@ -46,7 +46,9 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
         let settings = Arc::new(Store::open(good.config.settings_file.as_deref())?);
         let directory = good.config.history_dir.as_deref();
         let histories = directory.map_or_else(|| in_memory.clone(), |path| in_memory.kept_in(path));
-        let capture = arguments.capture.as_deref().map(|path| capture_of(path, number));
+        // A pipe takes all runs.
+        let of_run = |path: &Path| if path.is_file() { capture_of(path, number) } else { path.to_owned() };
+        let capture = arguments.capture.as_deref().map(of_run);
         let outputs = Outputs { capture: capture.as_deref(), settings: &settings, histories: &histories };
         match run_once(&good, arguments, &outputs, &asked, &manager)? {
             After::End { rested: true } => return Ok(ExitCode::SUCCESS),
@@ -181,9 +183,7 @@ fn attend(
     let mut told = false;
     let mut next = None;
     let mut reloads = false;
-    // A Reset is granted while nobody uses the gateway; an axis that was enabled since is not stopped by it.
-    let resets = || running.wants_restart() && !running.has_torque();
-    while !asked.stop.load(Ordering::Relaxed) && !resets() && !reloads {
+    while !asked.stop.load(Ordering::Relaxed) && !running.wants_restart() && !reloads {
         std::thread::sleep(LOOK_INTERVAL);
         manager.borrow_mut().look(Instant::now(), || running.status());
         if !told {

@@ -107,7 +107,7 @@ impl CanLink {
                         station.handle_frame(now, &frame);
                     }
                 }
-                Some(CanInput::Transmitted) => self.queue.note_transmitted(),
+                Some(CanInput::Transmitted) => self.queue.note_transmitted(now),
                 Some(CanInput::BusOff) => {
                     if self.back.lose(now) {
                         self.queue.reset();

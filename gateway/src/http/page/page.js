@@ -319,9 +319,9 @@ function showOverview({ health, status, history }) {
 // Whether the next event may be of another process: with another configuration, and counters that begin anew.
 let isAnew = false;
 
-// What was fetched once is of the configuration of before: every view is built again.
-function beginAnew() {
-  giveBack('Control was given back: the gateway has started again.');
+// What was fetched once may be of the configuration of before: every view is built again.
+function beginAnew(restarted) {
+  if (restarted) giveBack('Control was given back: the gateway has started again.');
   seen.faults = seen.log = null;
   axisView.name = mappingView.name = busView.name = null;
   timeView.built = false;
@@ -351,7 +351,8 @@ function connect() {
   source = new EventSource('/events');
   source.addEventListener('status', (event) => {
     const look = JSON.parse(event.data);
-    if (isAnew || (last && look.status.uptime_s < last.status.uptime_s)) beginAnew();
+    const restarted = last && look.status.uptime_s < last.status.uptime_s;
+    if (isAnew || restarted) beginAnew(restarted);
     show(look);
     lastEventAt = performance.now();
     if (look.health.alive) live();

@@ -54,15 +54,16 @@ impl Daemon {
 
     /// Looks at clock and daemon, four times in a second.
     pub fn look(&mut self, now: MonotonicTime) -> &TimeStatus {
+        // First the daemon: what a reading means depends on the offset to UTC that it says.
+        if self.turn == 0 {
+            let picture = self.client.ask();
+            self.watch.asked(picture, now);
+        }
         let reading = match &self.phc {
             Some(phc) => phc.read(),
             None => realtime_reading(),
         };
         self.watch.read(reading, self.phc.is_some());
-        if self.turn == 0 {
-            let picture = self.client.ask();
-            self.watch.asked(picture, now);
-        }
         self.turn = (self.turn + 1) % READINGS;
         self.watch.status(now)
     }
