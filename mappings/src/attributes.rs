@@ -134,9 +134,8 @@ pub enum ValueError {
 impl AttributeTable {
     pub(super) fn compile(tables: &CipTables, scaling: &CipScaling) -> Option<Self> {
         let mut entries = Vec::with_capacity(tables.attributes.len());
-        for row in &tables.attributes {
-            let (behind, turns) = behind(tables, row, scaling);
-            entries.push(entry(row, behind, turns, scaling)?);
+        for entry in compiled(tables, scaling) {
+            entries.push(entry?);
         }
         Some(Self { entries: Arc::new(entries) })
     }
@@ -149,16 +148,12 @@ impl AttributeTable {
     /// The attributes in another scaling, in place: nothing is allocated in a table of [`AttributeTable::with_room`]. `None`, and
     /// nothing done, when a ratio does not fit 64 bits, or the table is shared.
     pub(super) fn refill(&mut self, tables: &CipTables, scaling: &CipScaling) -> Option<()> {
-        let compiled = |row| {
-            let (behind, turns) = behind(tables, row, scaling);
-            entry(row, behind, turns, scaling)
-        };
-        if tables.attributes.iter().any(|row| compiled(row).is_none()) {
+        if compiled(tables, scaling).any(|entry| entry.is_none()) {
             return None;
         }
         let entries = Arc::get_mut(&mut self.entries)?;
         entries.clear();
-        entries.extend(tables.attributes.iter().filter_map(compiled));
+        entries.extend(compiled(tables, scaling).flatten());
         Some(())
     }
 
@@ -198,6 +193,17 @@ pub(super) fn behind<'t>(
             }
         }
     }
+}
+
+/// Each attribute in a scaling; `None` for one of which a ratio does not fit 64 bits.
+fn compiled<'t>(
+    tables: &'t CipTables,
+    scaling: &'t CipScaling,
+) -> impl Iterator<Item = Option<AttributeEntry>> + 't {
+    tables.attributes.iter().map(move |row| {
+        let (behind, turns) = behind(tables, row, scaling);
+        entry(row, behind, turns, scaling)
+    })
 }
 
 fn entry(

@@ -401,6 +401,45 @@ pub struct SequenceRow {
     pub source: Source,
 }
 
+impl SequenceRow {
+    /// Each key with its attribute.
+    pub(crate) fn attributes(&self) -> [(&'static str, &Name); 14] {
+        let Self {
+            stopping_action,
+            stopping_time_limit,
+            coasting_time_limit,
+            brake_release_delay,
+            brake_engage_delay,
+            zero_speed,
+            zero_speed_time,
+            ramp_velocity_positive,
+            ramp_velocity_negative,
+            ramp_acceleration,
+            ramp_deceleration,
+            deceleration_limit,
+            flying_start,
+            overtravel_checking,
+            source: _,
+        } = self;
+        [
+            ("stopping_action", stopping_action),
+            ("stopping_time_limit", stopping_time_limit),
+            ("coasting_time_limit", coasting_time_limit),
+            ("brake_release_delay", brake_release_delay),
+            ("brake_engage_delay", brake_engage_delay),
+            ("zero_speed", zero_speed),
+            ("zero_speed_time", zero_speed_time),
+            ("ramp_velocity_positive", ramp_velocity_positive),
+            ("ramp_velocity_negative", ramp_velocity_negative),
+            ("ramp_acceleration", ramp_acceleration),
+            ("ramp_deceleration", ramp_deceleration),
+            ("deceleration_limit", deceleration_limit),
+            ("flying_start", flying_start),
+            ("overtravel_checking", overtravel_checking),
+        ]
+    }
+}
+
 /// The attributes of what lies between motor and load. They can be set to what the scaling of the drive comes to, and to nothing else.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

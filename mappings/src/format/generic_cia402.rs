@@ -148,6 +148,20 @@ pub struct Cia402WordsRow {
     pub source: Source,
 }
 
+impl Cia402WordsRow {
+    /// Each key with its object.
+    pub(crate) fn objects(&self) -> [(&'static str, &Name); 6] {
+        [
+            ("control", &self.control),
+            ("status", &self.status),
+            ("mode", &self.mode),
+            ("mode_shown", &self.mode_shown),
+            ("modes_supported", &self.modes_supported),
+            ("polarity", &self.polarity),
+        ]
+    }
+}
+
 /// A signal and its object.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

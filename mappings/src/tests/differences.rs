@@ -226,16 +226,19 @@ fn a_row_that_is_taken_away_is_acknowledged_at_its_own_row_only() {
     assert_eq!(open(&format!("{elsewhere}{gone}")), 1);
 }
 
+/// The tables with an overlay in which `from` is replaced by `to` at its first place.
+fn with_replaced(overlay: &str, from: &str, to: &str) -> Mapping {
+    assert!(overlay.contains(from), "{from}");
+    let mut texts = TableTexts::embedded();
+    texts.overlays.push(Overlay::new("own.toml", &overlay.replacen(from, to, 1)));
+    Mapping::from_texts(&texts).unwrap_or_else(|findings| panic!("{findings}"))
+}
+
 /// What a parameter of a vendor is and takes, and how its ends hold it; more of range or access is dangerous, less is not.
 #[test]
 fn changes_of_a_vendors_parameter_are_told_and_what_widens_is_dangerous() {
     const EXAMPLE: &str = include_str!("../../../examples/overlays/vendor-parameter.toml");
-    let mapping = |from: &str, to: &str| {
-        assert!(EXAMPLE.contains(from), "{from}");
-        let mut texts = TableTexts::embedded();
-        texts.overlays.push(Overlay::new("own.toml", &EXAMPLE.replacen(from, to, 1)));
-        Mapping::from_texts(&texts).unwrap_or_else(|findings| panic!("{findings}"))
-    };
+    let mapping = |from: &str, to: &str| with_replaced(EXAMPLE, from, to);
     let old = mapping("", "");
     let told = |from: &str, to: &str| {
         let new = mapping(from, to);
@@ -285,12 +288,7 @@ fn changes_of_a_vendors_parameter_are_told_and_what_widens_is_dangerous() {
 #[test]
 fn changes_of_computed_values_are_told() {
     const EXAMPLE: &str = include_str!("../../../examples/overlays/computed.toml");
-    let mapping = |from: &str, to: &str| {
-        assert!(EXAMPLE.contains(from), "{from}");
-        let mut texts = TableTexts::embedded();
-        texts.overlays.push(Overlay::new("own.toml", &EXAMPLE.replacen(from, to, 1)));
-        Mapping::from_texts(&texts).unwrap_or_else(|findings| panic!("{findings}"))
-    };
+    let mapping = |from: &str, to: &str| with_replaced(EXAMPLE, from, to);
     let old = mapping("", "");
     let told = |from: &str, to: &str| {
         let new = mapping(from, to);

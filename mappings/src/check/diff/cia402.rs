@@ -33,14 +33,7 @@ pub(super) fn facts(mapping: &Mapping) -> Vec<Fact<'_>> {
     }
     let words = &rows.words;
     reader.named(("words", "direction"), Aspect::Sign, &words.direction);
-    for (key, name) in [
-        ("control", &words.control),
-        ("status", &words.status),
-        ("mode", &words.mode),
-        ("mode_shown", &words.mode_shown),
-        ("modes_supported", &words.modes_supported),
-        ("polarity", &words.polarity),
-    ] {
+    for (key, name) in words.objects() {
         reader.named(("words", key), Aspect::Binding, name);
     }
     let drive = &rows.drive;

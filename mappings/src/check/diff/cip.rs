@@ -2,7 +2,7 @@
 
 use super::{Aspect, Fact, Reader, Spanned, said, text};
 use crate::Mapping;
-use crate::format::{CipScalingRow, MechanicsRow, SequenceRow, listed};
+use crate::format::{CipScalingRow, MechanicsRow, listed};
 
 pub(super) fn facts(mapping: &Mapping) -> Vec<Fact<'_>> {
     let file = &mapping.tables().cip_generic;
@@ -85,7 +85,9 @@ pub(super) fn facts(mapping: &Mapping) -> Vec<Fact<'_>> {
             row.stopping_action.span(),
         );
     }
-    sequence(&mut reader, &rows.sequence);
+    for (key, name) in rows.sequence.attributes() {
+        reader.named(("sequence", key), Aspect::Binding, name);
+    }
     mechanics(&mut reader, &rows.mechanics);
     for row in &rows.event {
         let keys =
@@ -133,28 +135,6 @@ fn scaling(reader: &mut Reader<'_>, row: &CipScalingRow) {
     reader.say(("scaling", "feedback_resolution"), Aspect::Scale, says, row.configuration.span());
     reader.named(("scaling", "polarity"), Aspect::Sign, &row.polarity);
     reader.named(("scaling", "inverted"), Aspect::Sign, &row.inverted);
-}
-
-/// The attributes of the start and stop sequences.
-fn sequence(reader: &mut Reader<'_>, row: &SequenceRow) {
-    for (key, name) in [
-        ("stopping_action", &row.stopping_action),
-        ("stopping_time_limit", &row.stopping_time_limit),
-        ("coasting_time_limit", &row.coasting_time_limit),
-        ("brake_release_delay", &row.brake_release_delay),
-        ("brake_engage_delay", &row.brake_engage_delay),
-        ("zero_speed", &row.zero_speed),
-        ("zero_speed_time", &row.zero_speed_time),
-        ("ramp_velocity_positive", &row.ramp_velocity_positive),
-        ("ramp_velocity_negative", &row.ramp_velocity_negative),
-        ("ramp_acceleration", &row.ramp_acceleration),
-        ("ramp_deceleration", &row.ramp_deceleration),
-        ("deceleration_limit", &row.deceleration_limit),
-        ("flying_start", &row.flying_start),
-        ("overtravel_checking", &row.overtravel_checking),
-    ] {
-        reader.named(("sequence", key), Aspect::Binding, name);
-    }
 }
 
 /// The attributes of what lies between motor and load.

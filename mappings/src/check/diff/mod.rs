@@ -417,7 +417,7 @@ fn parameter(
     reader.say(id, Aspect::Missing, says, span(missing, name));
 }
 
-/// Whether something is so, if the row says it.
+/// What the row has under a key; nothing without the key.
 fn said(name: &str, value: Option<&Name>) -> String {
     value.map_or_else(String::new, |value| format!(", {name} {}", value.get_ref()))
 }

@@ -44,15 +44,7 @@ pub(super) fn cia402(mapping: &Mapping, findings: &mut Findings) {
     let file = &mapping.tables().generic_cia402;
     let mut reporter = Reporter { source: &file.text, findings };
     let places: Places = |known| known.objects;
-    let words = &file.rows.words;
-    for (word, object) in [
-        ("control", &words.control),
-        ("status", &words.status),
-        ("mode", &words.mode),
-        ("mode_shown", &words.mode_shown),
-        ("modes_supported", &words.modes_supported),
-        ("polarity", &words.polarity),
-    ] {
+    for (word, object) in file.rows.words.objects() {
         bound(&mut reporter, WORDS, word, (word, object), places, true);
     }
     for row in &file.rows.signal {

@@ -75,43 +75,9 @@ pub(super) fn check(mapping: &Mapping, findings: &mut Findings) {
 
 /// The attributes that start and stop an axis.
 fn sequence(reporter: &mut Reporter<'_>, row: &SequenceRow) {
-    let SequenceRow {
-        stopping_action,
-        stopping_time_limit,
-        coasting_time_limit,
-        brake_release_delay,
-        brake_engage_delay,
-        zero_speed,
-        zero_speed_time,
-        ramp_velocity_positive,
-        ramp_velocity_negative,
-        ramp_acceleration,
-        ramp_deceleration,
-        deceleration_limit,
-        flying_start,
-        overtravel_checking,
-        source: _,
-    } = row;
-    // In the order of the facts.
-    let given: [&Name; SEQUENCE.len()] = [
-        stopping_action,
-        stopping_time_limit,
-        coasting_time_limit,
-        brake_release_delay,
-        brake_engage_delay,
-        zero_speed,
-        zero_speed_time,
-        ramp_velocity_positive,
-        ramp_velocity_negative,
-        ramp_acceleration,
-        ramp_deceleration,
-        deceleration_limit,
-        flying_start,
-        overtravel_checking,
-    ];
-    for ((key, right), given) in
-        SEQUENCE.iter().zip(given).filter(|((_, right), given)| given.get_ref() != right)
-    {
+    for (key, given) in row.attributes() {
+        let fact = SEQUENCE.iter().find(|(known, _)| *known == key);
+        let Some((_, right)) = fact.filter(|(_, right)| given.get_ref() != right) else { continue };
         let what = [
             format!("`{key}` would follow the attribute `{}`", given.get_ref()),
             format!("expected `{right}`: the controller sets that one"),
