@@ -42,7 +42,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     let asked = Asked { stop, hurry, reload: super::signal::reload_on_hang_up()? };
     info!(name = good.config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
     let manager = RefCell::new(ServiceManager::of_environment(Instant::now()));
-    for number in 1_u32.. {
+    let mut number = 1;
+    loop {
         let settings = Arc::new(Store::open(good.config.settings_file.as_deref())?);
         let directory = good.config.history_dir.as_deref();
         let histories = directory.map_or_else(|| in_memory.clone(), |path| in_memory.kept_in(path));
@@ -55,8 +56,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
             After::End { rested: false } => return Ok(ExitCode::FAILURE),
             After::Again(next) => good = next.map_or(good, |next| *next),
         }
+        number += 1;
     }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// The recording of a run of the gateway: from the second on with its number, so that a restart erases none.

@@ -302,10 +302,7 @@ impl DirectNorth {
             if let (Err(failure), Some(len)) = (&result, rescales)
                 && !failure.may_have_written(len)
             {
-                let sharing = axes.iter_mut().enumerate();
-                sharing
-                    .filter(|(other, _)| buses.share_device(axis, *other))
-                    .for_each(|(_, axis)| axis.rescale(now, system, false));
+                sharing(axis, axes, buses).for_each(|axis| axis.rescale(now, system, false));
             }
             let _ = self.answers.push(DirectAnswer { client, id, result, data });
             return None;
@@ -327,8 +324,7 @@ impl DirectNorth {
             Ok(()) => {
                 let mut is_first = direction == (Direction::Write { rescales: true });
                 if is_first {
-                    let sharing = axes.iter_mut().enumerate();
-                    for (_, axis) in sharing.filter(|(other, _)| buses.share_device(axis, *other)) {
+                    for axis in sharing(axis, axes, buses) {
                         // What an earlier access has changed is not undone by a refusal of this one.
                         is_first &= !axis.is_rescaled();
                         axis.rescale(now, system, true);
@@ -342,6 +338,16 @@ impl DirectNorth {
         }
         written.map(|item| (axis, item))
     }
+}
+
+/// The axes of the device of an axis, that one included.
+fn sharing<'a>(
+    axis: usize,
+    axes: &'a mut [AxisChannel],
+    buses: &'a Buses,
+) -> impl Iterator<Item = &'a mut AxisChannel> {
+    let with_number = axes.iter_mut().enumerate();
+    with_number.filter(move |(other, _)| buses.share_device(axis, *other)).map(|(_, axis)| axis)
 }
 
 /// Why an access is not begun. Reading disturbs nobody.

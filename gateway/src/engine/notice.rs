@@ -644,8 +644,8 @@ impl fmt::Display for Notice {
             }
             Self::CommandsWithheld { address, .. } => write!(
                 f,
-                "the drive with SERCOS address {address} can be commissioned again; its commands, which it was spared since it was refused, are \
-                 executed at the next attempt"
+                "the drive with SERCOS address {address} was commissioned without its commands, because it had been refused before; it is left \
+                 out, and commissioned with them at the next attempt"
             ),
             Self::Startup { report, .. } => write!(f, "{report}"),
             Self::StartupFailed { failure, .. } => {

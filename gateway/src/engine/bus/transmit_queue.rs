@@ -1,7 +1,7 @@
 //! The way of a CAN bus's frames into the transmit queue.
 //!
 //! A controller whose frame nobody acknowledges repeats it until somebody does, however long that takes, and what is queued after it
-//! leaves then at once. So no more may be in the transmit queue than what was made in about a cycle. Where the port does not report
+//! leaves then at once. So no more may be in the transmit queue than what was made in a cycle or two. Where the port does not report
 //! what has left, the length of the queue alone limits this.
 
 use std::collections::VecDeque;

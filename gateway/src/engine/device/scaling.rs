@@ -62,15 +62,17 @@ impl Scaling {
     /// The scaling of the configuration; `None` if it cannot be expressed exactly.
     pub fn new(mapping: &Mapping, configured: CipScaling, feedback: FeedbackUse) -> Option<Self> {
         let attributes = mapping.attribute_table(&configured)?;
-        Some(Self {
-            used: configured,
-            configured,
-            attributes,
-            own: mapping.attribute_room(),
-            is_taken: false,
-            by_device: true,
-            feedback,
-        })
+        Some(Self::with_attributes(attributes, mapping, configured, feedback))
+    }
+
+    fn with_attributes(
+        attributes: AttributeTable,
+        mapping: &Mapping,
+        configured: CipScaling,
+        feedback: FeedbackUse,
+    ) -> Self {
+        let own = mapping.attribute_room();
+        Self { used: configured, configured, attributes, own, is_taken: false, by_device: true, feedback }
     }
 
     /// Whether this is the scaling of the configuration.
@@ -80,15 +82,7 @@ impl Scaling {
 
     /// The scaling of the configuration for another axis, which shares the attributes.
     pub fn alike(&self, mapping: &Mapping, feedback: FeedbackUse) -> Self {
-        Self {
-            used: self.configured,
-            configured: self.configured,
-            attributes: self.attributes.clone(),
-            own: mapping.attribute_room(),
-            is_taken: false,
-            by_device: true,
-            feedback,
-        }
+        Self::with_attributes(self.attributes.clone(), mapping, self.configured, feedback)
     }
 
     /// The attributes in the scaling that is in use.
