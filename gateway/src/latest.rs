@@ -1,6 +1,7 @@
 //! A cell that holds the latest value: one writer that never waits, any number of readers.
 //!
-//! The writer is the cycle thread, the readers are servers. A value is stored as 64-bit words in atomics,
+//! The writer is the cycle thread and the readers are servers; only system time goes the other way, and there the cycle thread reads
+//! without waiting ([`Reader::try_read`]). A value is stored as 64-bit words in atomics,
 //! guarded by a sequence number that is odd while the words change (a sequence lock): a reader that saw the
 //! number change reads again. No reader can hold up the writer, nothing is allocated after construction, and
 //! there is no unsafe code, because torn words are plain numbers that are thrown away before they are looked
@@ -87,23 +88,31 @@ impl<T: Words> Publisher<T> {
 }
 
 impl<T: Words> Reader<T> {
-    /// The value published last. Waits only while a publication, well under a microsecond, is under way.
+    /// The value published last; `None` while a publication is under way. Never waits.
+    #[must_use]
+    pub fn try_read(&self) -> Option<T> {
+        let cell = &*self.cell;
+        let before = cell.sequence.load(Ordering::Acquire);
+        if !before.is_multiple_of(2) {
+            return None;
+        }
+        let mut words = T::EMPTY;
+        for (word, place) in words.as_mut().iter_mut().zip(&cell.words) {
+            *word = place.load(Ordering::Relaxed);
+        }
+        // No word above may be read after the number below.
+        fence(Ordering::Acquire);
+        (cell.sequence.load(Ordering::Relaxed) == before).then(|| T::from_words(&words))
+    }
+
+    /// The value published last. Waits only while a publication, well under a microsecond, is under way: not for the cycle thread,
+    /// which a writer with less priority could keep waiting until it gets the processor again.
     #[must_use]
     pub fn read(&self) -> T {
-        let cell = &*self.cell;
-        let mut words = T::EMPTY;
         let mut tries = 0_u32;
         loop {
-            let before = cell.sequence.load(Ordering::Acquire);
-            if before.is_multiple_of(2) {
-                for (word, place) in words.as_mut().iter_mut().zip(&cell.words) {
-                    *word = place.load(Ordering::Relaxed);
-                }
-                // No word above may be read after the number below.
-                fence(Ordering::Acquire);
-                if cell.sequence.load(Ordering::Relaxed) == before {
-                    return T::from_words(&words);
-                }
+            if let Some(value) = self.try_read() {
+                return value;
             }
             tries = tries.wrapping_add(1);
             if tries.is_multiple_of(SPINS) {
@@ -184,6 +193,17 @@ mod tests {
         publisher.publish(&Uniform(8));
         publisher.publish(&Uniform(9));
         assert_eq!((reader.read(), other.read()), (Uniform(9), Uniform(9)));
+    }
+
+    #[test]
+    fn a_publication_under_way_is_not_waited_for() {
+        let (mut publisher, reader) = latest(Uniform(1));
+        publisher.publish(&Uniform(2));
+        assert_eq!(reader.try_read(), Some(Uniform(2)));
+        publisher.cell.sequence.fetch_add(1, Ordering::Relaxed);
+        assert_eq!(reader.try_read(), None);
+        publisher.cell.sequence.fetch_add(1, Ordering::Relaxed);
+        assert_eq!(reader.try_read(), Some(Uniform(2)));
     }
 
     #[test]

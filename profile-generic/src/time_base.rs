@@ -45,10 +45,10 @@ pub struct TimeBase {
     anchor: MonotonicTime,
     /// System time at the anchor.
     system: SystemTime,
-    /// Rate with the slew in it, parts per thousand million.
-    rate_ppb: i64,
-    /// Rate that the source knows, without the slew.
+    /// Rate that the source knows, parts per thousand million.
     source_ppb: i64,
+    /// What the slew adds to it, for [`SLEW_TIME`] from the anchor.
+    slew_ppb: i64,
     /// System Time Offset: system time less local clock.
     offset: DurationNs,
     /// A difference beyond the threshold waits for a second sample: one alone may be a reading that was interrupted.
@@ -65,8 +65,8 @@ impl TimeBase {
         Self {
             anchor: first.at,
             system: first.system,
-            rate_ppb: 0,
             source_ppb: 0,
+            slew_ppb: 0,
             offset: DurationNs(offset),
             candidate: None,
             steps: 0,
@@ -77,7 +77,14 @@ impl TimeBase {
     #[must_use]
     pub fn system_at(&self, at: MonotonicTime) -> SystemTime {
         let elapsed = at.since(self.anchor);
-        self.system + elapsed + drift(elapsed, self.rate_ppb)
+        self.system + elapsed + self.gained(elapsed)
+    }
+
+    /// What system time gains on the monotonic clock in a time from the anchor. The slew ends when it has removed the difference, also
+    /// when no sample comes that shows that.
+    fn gained(&self, elapsed: DurationNs) -> DurationNs {
+        let slewed = DurationNs(elapsed.0.clamp(-SLEW_TIME.0, SLEW_TIME.0));
+        drift(elapsed, self.source_ppb) + drift(slewed, self.slew_ppb)
     }
 
     /// The instant of the monotonic clock at which it is this system time, to some nanoseconds within an hour of the last sample.
@@ -86,7 +93,7 @@ impl TimeBase {
     pub fn monotonic_at(&self, system: SystemTime) -> MonotonicTime {
         let elapsed = system.since(self.system);
         // Each round leaves a thousandth of the error of the one before.
-        let correction = (0..3).fold(DurationNs::ZERO, |gained, _| drift(elapsed - gained, self.rate_ppb));
+        let correction = (0..3).fold(DurationNs::ZERO, |gained, _| self.gained(elapsed - gained));
         self.anchor + elapsed - correction
     }
 
@@ -121,7 +128,7 @@ impl TimeBase {
             (self.anchor, self.system) = (sample.at, expected);
             let slew = difference.0 * BILLION / SLEW_TIME.0;
             self.source_ppb = sample.rate_ppb.clamp(-RATE_PPB_MAX, RATE_PPB_MAX);
-            self.rate_ppb = self.source_ppb + slew.clamp(-SLEW_PPB, SLEW_PPB);
+            self.slew_ppb = slew.clamp(-SLEW_PPB, SLEW_PPB);
             return None;
         }
         let before = self.candidate.replace(difference)?;
@@ -246,6 +253,20 @@ mod tests {
     }
 
     #[test]
+    fn a_slew_ends_though_no_sample_comes() {
+        for later in [50_000, -50_000, 1_000] {
+            let mut base = begun();
+            base.feed(&TimeSample { rate_ppb: 20_000, ..sample(ms(1), later) });
+            for seconds in [1, 10, 600] {
+                let at = ms(1 + seconds * 1_000);
+                let source = sample(at, later + at_rate(at, 20_000) - at_rate(ms(1), 20_000)).system;
+                assert!(source.since(base.system_at(at)).magnitude() <= 5, "{later} {seconds}");
+                assert!(base.monotonic_at(source).since(at).magnitude() <= 5, "{later} {seconds}");
+            }
+        }
+    }
+
+    #[test]
     fn a_source_of_another_rate_is_followed() {
         for ppb in [20_000, -20_000, 200_000, -200_000] {
             for known in [0, ppb] {
@@ -278,8 +299,12 @@ mod tests {
     proptest! {
         /// Whatever the rate, both directions agree within some nanoseconds over an hour either way.
         #[test]
-        fn there_and_back(rate in -1_000_000_i64..=1_000_000, elapsed in -3_600_000_000_000_i64..=3_600_000_000_000) {
-            let base = TimeBase { rate_ppb: rate, anchor: MonotonicTime(10_000_000_000_000), ..begun() };
+        fn there_and_back(
+            source_ppb in -1_000_000_i64..=1_000_000,
+            slew_ppb in -1_000_000_i64..=1_000_000,
+            elapsed in prop_oneof![-3_600_000_000_000_i64..=3_600_000_000_000, -200_000_000_i64..=200_000_000],
+        ) {
+            let base = TimeBase { source_ppb, slew_ppb, anchor: MonotonicTime(10_000_000_000_000), ..begun() };
             let at = base.anchor + DurationNs(elapsed);
             let error = base.monotonic_at(base.system_at(at)).since(at);
             prop_assert!(error.magnitude() <= 5, "{error}");

@@ -346,9 +346,8 @@ impl Engine {
     /// Sends what was built ahead and whose instant has come. What could only go out much too late does not.
     fn send_prepared(&mut self, now: MonotonicTime, south: &mut [SouthPort<'_>]) {
         for (place, (bus, port)) in self.buses.iter_mut().zip(south.iter_mut()).enumerate() {
-            let before = bus.next_cycle();
-            bus.skip_late(now);
-            if let Some(at) = self.schedule.take_prepared(place, now, before != bus.next_cycle()) {
+            let left_out = bus.skip_late(now);
+            if let Some(at) = self.schedule.take_prepared(place, now, left_out) {
                 send(bus, port, (now, at), place, &mut self.schedule, &mut self.publication);
             }
         }

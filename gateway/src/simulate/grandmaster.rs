@@ -62,7 +62,7 @@ impl Grandmaster {
         let control = Arc::new(Control::default());
         control.domain.store(config.domain, Ordering::Relaxed);
         let shared = Arc::new(Mutex::new(Shared::default()));
-        let mut wire = HostWire { sockets, domain: config.domain, control: Arc::clone(&control) };
+        let mut wire = HostWire::new(sockets, config.domain, Arc::clone(&control));
         let place = Arc::clone(&shared);
         let run = move || {
             let write = |change: &dyn Fn(&mut Shared)| {

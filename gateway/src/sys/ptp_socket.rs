@@ -96,6 +96,8 @@ pub struct Arrived {
 /// See the module.
 #[derive(Debug)]
 pub struct PtpSockets {
+    interface: String,
+    index: i32,
     event: Socket,
     general: Socket,
     /// Those of the card, or why the kernel's are taken.
@@ -110,8 +112,8 @@ impl PtpSockets {
     pub fn open(interface: &str, dscp: Dscp, use_card: bool) -> Result<Self, OpenError> {
         let index = link::index(interface)
             .map_err(|_| OpenError::NoSuchInterface { interface: interface.to_owned() })?;
-        let index = u32::try_from(index).unwrap_or(0);
-        let event = open(EVENT, index, dscp.event)?;
+        let number = u32::try_from(index).unwrap_or(0);
+        let event = open(EVENT, number, dscp.event)?;
         let system = |step| move |source| OpenError::System { port: EVENT, step, source };
         if !enable_time_stamps(event.as_fd()) {
             return Err(system("SO_TIMESTAMPNS")(io::Error::last_os_error()));
@@ -121,7 +123,15 @@ impl PtpSockets {
         if card.is_err() {
             enable_sent_time_stamps(event.as_fd()).map_err(system("SO_TIMESTAMPING"))?;
         }
-        Ok(Self { event, general: open(GENERAL, index, dscp.general)?, card })
+        let general = open(GENERAL, number, dscp.general)?;
+        Ok(Self { interface: interface.to_owned(), index, event, general, card })
+    }
+
+    /// Whether the interface has gone and come back as another one under its name: its group was left with the first one, and
+    /// nothing is heard on these sockets any more.
+    #[must_use]
+    pub fn is_replaced(&self) -> bool {
+        link::index(&self.interface).is_ok_and(|index| index != self.index)
     }
 
     /// The card that stamps, or why the kernel does.

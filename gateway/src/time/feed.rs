@@ -103,6 +103,8 @@ impl Words for CycleTime {
 #[derive(Debug)]
 pub struct TimeFeed {
     reader: Reader<CycleTime>,
+    /// What was read last.
+    latest: CycleTime,
     /// System time is the host's clock; otherwise what is told.
     is_host: bool,
     last: Option<(SyncState, SyncQuality)>,
@@ -116,13 +118,9 @@ impl TimeFeed {
     /// A feed from what the source reports; with `is_host` the time is that of the host's clock. `threshold` is that of a clock that no
     /// controller has said another one to, ns.
     #[must_use]
-    pub const fn new(
-        reader: Reader<CycleTime>,
-        is_host: bool,
-        control: Arc<Control>,
-        threshold: u64,
-    ) -> Self {
-        Self { reader, is_host, last: None, control, threshold }
+    pub fn new(reader: Reader<CycleTime>, is_host: bool, control: Arc<Control>, threshold: u64) -> Self {
+        let latest = reader.read();
+        Self { reader, latest, is_host, last: None, control, threshold }
     }
 
     /// Feeds before the first cycle.
@@ -135,7 +133,11 @@ impl TimeFeed {
 
     /// Feeds after a cycle: a sample that is a cycle old is as good.
     pub fn feed(&mut self, engine: &mut Engine) {
-        let latest = self.reader.read();
+        // The thread that writes may have lost its processor to this one: what it is writing is there in the next cycle.
+        if let Some(latest) = self.reader.try_read() {
+            self.latest = latest;
+        }
+        let latest = self.latest;
         if self.last != Some((latest.sync, latest.quality)) {
             self.last = Some((latest.sync, latest.quality));
             engine.set_sync(latest.sync);

@@ -138,7 +138,7 @@ pub struct Judge {
     /// A Sync of this master has come.
     has_heard: bool,
     interval: u64,
-    /// What the last offsets were at most, ns.
+    /// What the last Sync has shown, ns; `u64::MAX` before the first one of this grandmaster.
     last_offset: u64,
 }
 
@@ -155,7 +155,7 @@ impl Judge {
             heard: MonotonicTime::ZERO,
             has_heard: false,
             interval: INTERVAL_NS,
-            last_offset: 0,
+            last_offset: u64::MAX,
         }
     }
 
@@ -170,7 +170,7 @@ impl Judge {
         self.phase
     }
 
-    /// Bound of the error at an instant, ns: what the last offset was, and the drift since then.
+    /// Bound of the error at an instant, ns: what the last offset was, and the drift since then. `u64::MAX` while none was measured.
     #[must_use]
     pub fn error_bound(&self, now: MonotonicTime) -> u64 {
         let silent = now.0.saturating_sub(self.heard.0);
@@ -231,6 +231,7 @@ impl Judge {
     fn measured(&mut self, offset: i64, now: MonotonicTime) -> SyncPhase {
         self.heard(now);
         let offset = offset.unsigned_abs();
+        self.last_offset = offset;
         if offset > self.threshold {
             self.bad = self.bad.saturating_add(1);
             if self.bad >= BAD {
@@ -246,7 +247,6 @@ impl Judge {
                 phase => phase,
             };
         }
-        self.last_offset = offset;
         (self.good, self.bad) = (self.good.saturating_add(1), 0);
         match self.phase {
             SyncPhase::Synchronized | SyncPhase::Holdover => SyncPhase::Synchronized,
@@ -290,7 +290,7 @@ impl Judge {
 
     fn start_over(&mut self, now: MonotonicTime) {
         (self.good, self.bad, self.heard) = (0, 0, now);
-        (self.interval, self.has_heard) = (INTERVAL_NS, false);
+        (self.interval, self.has_heard, self.last_offset) = (INTERVAL_NS, false, u64::MAX);
     }
 }
 
@@ -380,6 +380,17 @@ mod tests {
                 "one value alone may be an odd one"
             );
         }
+    }
+
+    #[test]
+    fn the_bound_is_what_was_measured_last() {
+        assert_eq!(Judge::new(THRESHOLD).error_bound(at(1)), u64::MAX, "nothing was measured");
+        let mut judge = synchronized();
+        judge.handle(Event::Offset(-50_000), at(11));
+        assert_eq!(judge.error_bound(at(13)), 51_000);
+        assert_eq!(judge.handle(Event::NoMaster, at(13)), Some(SyncPhase::Listening), "it is not held over");
+        judge.handle(Event::Master { grandmaster: true }, at(14));
+        assert_eq!(judge.error_bound(at(15)), u64::MAX, "of another grandmaster nothing was measured");
     }
 
     #[test]

@@ -233,7 +233,8 @@ impl Reporter {
         {
             info!(grandmaster = %Identity(grandmaster), "system time: another grandmaster is followed");
         }
-        if before.is_some_and(|before| before.2 != status.steps) {
+        // A follower that begins anew counts from zero.
+        if before.is_some_and(|before| before.2 < status.steps) {
             warn!(steps = status.steps, "system time: the grandmaster's clock has stepped");
         }
         if before.is_none_or(|before| before.0 != status.phase) {
@@ -295,7 +296,7 @@ fn run_follower(
         let failure = match opened {
             Ok(sockets) => {
                 port.report(&sockets);
-                let mut wire = HostWire { sockets, domain: config.domain, control: Arc::clone(control) };
+                let mut wire = HostWire::new(sockets, config.domain, Arc::clone(control));
                 let followed = catch_unwind(AssertUnwindSafe(|| {
                     follow(&config, &mut wire, &mut |status| reporter.report(status))
                 }));
@@ -333,7 +334,11 @@ fn phc(config: &Time, interface: Option<&String>) -> Result<Option<Phc>, SourceE
 /// Tells what `ptp4l` says.
 fn watch_daemon(mut daemon: Daemon, control: &Control, mut reporter: Reporter) {
     while !control.stop.load(Ordering::Relaxed) {
+        daemon.set_domain(control.domain.load(Ordering::Relaxed));
         daemon.set_threshold(control.threshold.load(Ordering::Relaxed));
+        if control.forget.swap(false, Ordering::Relaxed) {
+            daemon.forget();
+        }
         reporter.report(daemon.look(monotonic_now()));
         std::thread::sleep(LOOK);
     }

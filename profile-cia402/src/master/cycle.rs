@@ -25,16 +25,18 @@ impl Master {
     }
 
     /// Leaves out SYNCs that could only go out late, by more than half a period: devices would take the values of two periods
-    /// nearly at once. The grid stays where it is.
-    pub fn skip_late(&mut self, now: MonotonicTime) {
-        let Some(sync) = self.config.sync.filter(|_| self.running && !self.bus_off) else { return };
+    /// nearly at once. The grid stays where it is. Returns whether one was left out.
+    pub fn skip_late(&mut self, now: MonotonicTime) -> bool {
+        let Some(sync) = self.config.sync.filter(|_| self.running && !self.bus_off) else { return false };
         let period = i64::from(sync.period_ns).max(1);
         let late = now.since(self.next_sync).as_nanos();
-        if late > period / 2 {
-            let missed = ((late + period / 2) / period).max(1);
-            self.next_sync = self.next_sync + DurationNs(period) * missed;
-            self.statistics.syncs_skipped += missed.unsigned_abs();
+        if late <= period / 2 {
+            return false;
         }
+        let missed = ((late + period / 2) / period).max(1);
+        self.next_sync = self.next_sync + DurationNs(period) * missed;
+        self.statistics.syncs_skipped += missed.unsigned_abs();
+        true
     }
 
     /// Moves the grid: the next SYNC comes by so much later, and all that follow it.

@@ -237,22 +237,26 @@ impl Master {
     }
 
     /// Leaves out what could only go out late, by more than half a cycle, in CP4: frames that are built, and cycles that are not.
-    /// A late MST would be near the next one, and no slave takes it for this cycle's. The grid stays where it is.
-    pub fn skip_late(&mut self, now: MonotonicTime) {
+    /// A late MST would be near the next one, and no slave takes it for this cycle's. The grid stays where it is. Returns whether
+    /// something was left out: values that were committed for it have not been sent.
+    pub fn skip_late(&mut self, now: MonotonicTime) -> bool {
         if self.run.state() != State::Cp4 {
-            return;
+            return false;
         }
         let cycle = self.cycle_time();
         let frames = &mut self.net.frames;
         let statistics = &mut self.net.journal.statistics;
+        let mut skipped = 0;
         if frames.has_transmit() && grid::is_late(now, self.grid.send_at, cycle) {
             frames.discard();
             self.grid.left_out = true;
-            statistics.skipped += 1;
+            skipped += 1;
         }
         if !frames.has_transmit() {
-            statistics.skipped += self.grid.skip_late(now, cycle);
+            skipped += self.grid.skip_late(now, cycle);
         }
+        statistics.skipped += skipped;
+        skipped > 0
     }
 
     /// Starts the next cycle when its time has come, and gives its frames one by one; those that were built ahead at their

@@ -199,6 +199,11 @@ fn the_box_follows_a_foreign_grandmaster_through_its_loss_and_a_better_one() {
     wait_for(&log, "holdover: the master is silent", &mut the_box);
     let held = time_sync(&controller, &python, &["6=0000000000000000"]);
     assert_eq!((octets(&held, 2), held["set 6"].as_str()), ([1], Some("done")));
+    // The interface goes and comes back as another one under its name.
+    let mut unplug = gateway.command("ip");
+    assert!(unplug.args(["link", "delete", "net0"]).status().is_ok_and(|status| status.success()));
+    cable((&controller, "net0", Some("192.168.30.1/24")), (&gateway, "net0", Some(&format!("{BOX}/24"))));
+    wait_for(&log, "the interface was replaced by another one of its name", &mut the_box);
     // A better one comes.
     let mut better = grandmaster(&controller, 100);
     let log_before =

@@ -142,8 +142,9 @@ pub trait South {
     /// The instant on the grid at which the next cycle begins; `None` before the bus has a grid.
     fn next_cycle(&self) -> Option<MonotonicTime>;
 
-    /// Skips cycles that would begin late by more than half of the cycle time. The grid does not move.
-    fn skip_late(&mut self, now: MonotonicTime);
+    /// Skips cycles that would begin late by more than half of the cycle time, with the frames that were built for them. The grid
+    /// does not move. Returns whether one was skipped: what the axes have given for it was not sent.
+    fn skip_late(&mut self, now: MonotonicTime) -> bool;
 
     /// Moves the grid: the next cycle begins by so much later, and all that follow it.
     fn shift_grid(&mut self, by: DurationNs);

@@ -57,7 +57,7 @@ impl Client {
         picture
     }
 
-    /// PairedReading the daemon's socket it can be reached by a daemon with its own `/tmp`.
+    /// Binds a socket beside that of the daemon, so that one with a `/tmp` of its own can answer; else in `/tmp`.
     fn connect(&self) -> std::io::Result<(UnixDatagram, Own)> {
         let name = format!("axisbridge-ptp-{}", std::process::id());
         let beside = self.daemon.parent().map(|folder| folder.join(&name));
@@ -78,16 +78,45 @@ impl Client {
 
 /// One question and its answer.
 fn ask(socket: &UnixDatagram, question: Question, domain: u8, sequence: u16, end: Instant) -> Option<Answer> {
+    let left = || end.checked_duration_since(Instant::now()).filter(|left| !left.is_zero());
+    // A daemon that stands lets its queue fill.
+    socket.set_write_timeout(Some(left()?)).ok()?;
     socket.send(&question.emit(domain, sequence)).ok()?;
     let mut buffer = [0; ANSWER_MAX];
     loop {
-        let left = end.checked_duration_since(Instant::now()).filter(|left| !left.is_zero())?;
-        socket.set_read_timeout(Some(left)).ok()?;
+        socket.set_read_timeout(Some(left()?)).ok()?;
         let length = socket.recv(&mut buffer).ok()?;
         match Answer::parse(buffer.get(..length)?) {
             Some((number, answer)) if number == sequence => return Some(answer),
             // Of an earlier question, or an error.
             _ => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// More questions than any queue of the kernel holds.
+    const QUESTIONS: usize = 600;
+
+    #[test]
+    fn a_daemon_that_takes_nothing_holds_nobody_up() {
+        let folder = std::env::temp_dir().join(format!("axisbridge-ptp-test-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("ptp4l");
+        let daemon = UnixDatagram::bind(&path).unwrap();
+        let (socket, own) = Client::new(&path, 0).connect().unwrap();
+        let mut refused = 0;
+        for sequence in 0..QUESTIONS {
+            let end = Instant::now() + Duration::from_millis(1);
+            let sequence = u16::try_from(sequence).unwrap();
+            assert_eq!(ask(&socket, Question::Current, 0, sequence, end), None);
+            refused += 1;
+        }
+        assert_eq!(refused, QUESTIONS);
+        drop((daemon, socket, own));
+        std::fs::remove_dir_all(folder).unwrap();
     }
 }

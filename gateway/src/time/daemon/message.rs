@@ -7,6 +7,9 @@
 
 use crate::time::status::{Master, Quality};
 
+/// Seconds from UTC to TAI that `ptp4l` assumes while its master does not vouch for more (its option `utc_offset`).
+const UTC_OFFSET: i16 = 37;
+
 /// Bytes of a question.
 pub const QUESTION_LEN: usize = 54;
 
@@ -178,6 +181,9 @@ fn number<T>(message: &[u8], place: usize) -> Option<u64> {
 pub struct Picture {
     /// Who is followed.
     pub master: Master,
+    /// Seconds that system time is ahead of `CLOCK_REALTIME` where `ptp4l` keeps that: it counts UTC, whatever the master counts. It
+    /// takes the master's offset if that is valid and traceable, or larger than its own one.
+    pub utc_seconds: i16,
     /// State of the port.
     pub port: u8,
     /// Offset from the master, ns.
@@ -217,7 +223,13 @@ impl Picture {
             time_traceable: is_set(16),
             frequency_traceable: is_set(32),
         };
-        Some(Self { master, port: state, offset, ingress, has_grandmaster, mean_path_delay })
+        let is_believed = is_set(4) && is_set(16) || utc_offset > UTC_OFFSET;
+        let utc_seconds = match (is_set(8), is_believed) {
+            (false, _) => 0,
+            (true, true) => utc_offset,
+            (true, false) => UTC_OFFSET,
+        };
+        Some(Self { master, utc_seconds, port: state, offset, ingress, has_grandmaster, mean_path_delay })
     }
 }
 
@@ -312,6 +324,30 @@ mod tests {
         );
         answers[3] = None;
         assert_eq!(Picture::of(&answers), None);
+    }
+
+    /// As linuxptp 3 and 4 correct a clock that counts UTC.
+    #[test]
+    fn seconds_to_utc_are_those_that_ptp4l_takes() {
+        const SCALE: u8 = 8;
+        const VALID: u8 = 4;
+        const TRACEABLE: u8 = 16;
+        for (flags, utc_offset, seconds) in [
+            (0, 37, 0),
+            (VALID | TRACEABLE, 37, 0),
+            (SCALE, 37, 37),
+            (SCALE, 0, 37),
+            (SCALE, 36, 37),
+            (SCALE, 38, 38),
+            (SCALE | VALID, 36, 37),
+            (SCALE | TRACEABLE, 36, 37),
+            (SCALE | VALID | TRACEABLE, 36, 36),
+            (SCALE | VALID | TRACEABLE, 38, 38),
+        ] {
+            let mut answers = samples().map(|(_, answer)| Some(answer));
+            answers[2] = Some(Answer::TimeProperties { utc_offset, flags, source: 0x20 });
+            assert_eq!(Picture::of(&answers).unwrap().utc_seconds, seconds, "{flags} {utc_offset}");
+        }
     }
 
     proptest::proptest! {

@@ -2,12 +2,13 @@
 //!
 //! With hardware time stamps that is the clock of the network card (PHC), otherwise `CLOCK_REALTIME`. Either is read beside the monotonic
 //! clock four times in a second, and the [`Line`] through the readings is system time: the PHC has the master's time, and
-//! `CLOCK_REALTIME` has it without the seconds to UTC where the master counts those of TAI.
+//! `CLOCK_REALTIME` has it without the seconds to UTC where the master counts those of TAI. How many these are the daemon says while
+//! it follows a master; they stay when it falls silent.
 
 mod client;
 pub mod message;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use profile_generic::time::MonotonicTime;
 
@@ -33,6 +34,8 @@ const READINGS: u8 = 4;
 /// The daemon as it is seen.
 #[derive(Debug)]
 pub struct Daemon {
+    config: FollowerConfig,
+    socket: PathBuf,
     client: Client,
     phc: Option<Phc>,
     watch: Watch,
@@ -43,7 +46,28 @@ impl Daemon {
     /// A daemon that listens on a socket; the time is that of `phc`, or of the host's clock.
     #[must_use]
     pub fn new(config: &FollowerConfig, socket: &Path, phc: Option<Phc>) -> Self {
-        Self { client: Client::new(socket, config.domain), phc, watch: Watch::new(config), turn: 0 }
+        Self {
+            config: *config,
+            socket: socket.to_owned(),
+            client: Client::new(socket, config.domain),
+            phc,
+            watch: Watch::new(config),
+            turn: 0,
+        }
+    }
+
+    /// The daemon is asked in this domain; in another one than before everything begins anew.
+    pub fn set_domain(&mut self, domain: u8) {
+        if self.config.domain != domain {
+            self.config.domain = domain;
+            self.client = Client::new(&self.socket, domain);
+            (self.watch, self.turn) = (Watch::new(&self.config), 0);
+        }
+    }
+
+    /// The largest offset begins anew.
+    pub fn forget(&mut self) {
+        self.watch.status.max_offset = 0;
     }
 
     /// The clock is synchronized within another threshold from the next offset on, ns.
@@ -76,6 +100,8 @@ struct Watch {
     judge: Judge,
     status: TimeStatus,
     ingress: Option<i64>,
+    /// Seconds from `CLOCK_REALTIME` to the time of the master; `None` before the first one.
+    utc_seconds: Option<i16>,
     silent: u8,
     /// Readings of the clock that failed in a row.
     unread: u8,
@@ -88,6 +114,7 @@ impl Watch {
             judge: Judge::new(config.threshold),
             status: TimeStatus::ptp(config),
             ingress: None,
+            utc_seconds: None,
             silent: 0,
             unread: 0,
         }
@@ -112,7 +139,11 @@ impl Watch {
             self.judge.handle(Event::NoMaster, now);
         }
         if let Some(master) = master {
+            self.utc_seconds = Some(picture.utc_seconds);
             let grandmaster = self.status.grandmaster != Some(master.grandmaster);
+            if grandmaster {
+                self.status.max_offset = 0;
+            }
             if grandmaster || self.status.master.is_none() {
                 self.judge.handle(Event::Master { grandmaster }, now);
                 self.status.grandmaster = Some(master.grandmaster);
@@ -146,10 +177,9 @@ impl Watch {
             return;
         };
         self.unread = 0;
-        let master = self.status.master;
-        let seconds =
-            master.filter(|master| master.ptp_time_scale && !is_phc).and_then(|master| master.utc_offset);
-        let time = i128::from(reading.time) + i128::from(seconds.unwrap_or(0)) * 1_000_000_000;
+        // Before anybody has said what the host's clock counts, its time is not known.
+        let Some(seconds) = (if is_phc { Some(0) } else { self.utc_seconds }) else { return };
+        let time = i128::from(reading.time) + i128::from(seconds) * 1_000_000_000;
         if let Ok(phase) = i64::try_from(time - i128::from(reading.at.0)) {
             self.line.sync(reading.at, phase);
         }
@@ -186,6 +216,7 @@ mod tests {
             time_traceable: true,
             frequency_traceable: true,
         },
+        utc_seconds: 37,
         port: SLAVE,
         offset: 300,
         ingress: 0,
@@ -287,5 +318,58 @@ mod tests {
             assert!(sample.system.0.abs_diff(expected) <= 5, "{} {expected}", sample.system.0);
             assert!((sample.rate_ppb - 100_000).abs() <= 5, "{}", sample.rate_ppb);
         }
+    }
+
+    /// Readings of the host's clock from second 10 on, a quarter of a second apart, and the sample after each.
+    fn read_on(watch: &mut Watch, quarters: std::ops::Range<u64>) -> Vec<u64> {
+        let readings = quarters.map(|quarter| {
+            let now = MonotonicTime(at(10).0 + quarter * 250_000_000);
+            let time = 1_700_000_000_000_000_000 + now.0;
+            watch.read(Some(PairedReading { apart: 100, at: now, time }), false);
+            watch.status(now).sample.map_or(0, |sample| sample.system.0 - now.0)
+        });
+        readings.collect()
+    }
+
+    #[test]
+    fn system_time_keeps_the_seconds_to_utc_when_daemon_or_master_fall_silent() {
+        const PHASE: u64 = 1_700_000_000_000_000_000 + 37_000_000_000;
+        let mut watch = slave();
+        assert_eq!(read_on(&mut watch, 0..8), [PHASE; 8]);
+        (0..3).for_each(|second| watch.asked(None, at(12 + second)));
+        assert_eq!(watch.status(at(15)).master, None);
+        assert_eq!(read_on(&mut watch, 20..28), [PHASE; 8]);
+        // It listens for a master, and is its own grandmaster meanwhile.
+        let listening = Picture { port: 4, has_grandmaster: false, utc_seconds: 0, ..SLAVE_OF };
+        watch.asked(Some(listening), at(17));
+        assert_eq!(read_on(&mut watch, 28..36), [PHASE; 8]);
+    }
+
+    #[test]
+    fn the_hosts_clock_is_not_system_time_before_the_daemon_says_what_it_counts() {
+        let mut watch = Watch::new(&CONFIG);
+        assert_eq!(read_on(&mut watch, 0..4), [0; 4]);
+    }
+
+    #[test]
+    fn the_largest_offset_begins_anew_with_another_grandmaster() {
+        let mut watch = slave();
+        assert_eq!(watch.status(at(10)).max_offset, 300);
+        let other = Master { grandmaster: [2; 8], ..SLAVE_OF.master };
+        watch.asked(Some(Picture { master: other, offset: -20, ingress: 77, ..SLAVE_OF }), at(11));
+        assert_eq!(watch.status(at(11)).max_offset, 20);
+    }
+
+    #[test]
+    fn another_domain_begins_anew_and_the_same_one_does_not() {
+        let mut daemon = Daemon::new(&CONFIG, Path::new("/nonexistent/ptp4l"), None);
+        daemon.watch = slave();
+        daemon.set_domain(0);
+        assert_eq!(daemon.watch.status(at(10)).phase, SyncPhase::Synchronized);
+        daemon.forget();
+        assert_eq!(daemon.watch.status(at(10)).max_offset, 0);
+        daemon.set_domain(5);
+        let status = daemon.watch.status(at(10));
+        assert_eq!((status.phase, status.domain, status.grandmaster), (SyncPhase::Listening, 5, None));
     }
 }

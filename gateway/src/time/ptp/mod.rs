@@ -15,7 +15,7 @@ pub mod wire;
 
 use std::io;
 
-use profile_generic::time::MonotonicTime;
+use profile_generic::time::{DurationNs, MonotonicTime};
 use rand::SeedableRng as _;
 use rand::rngs::StdRng;
 use statime::config::{
@@ -63,6 +63,9 @@ const ANNOUNCE_TIME_OUT: u8 = 3;
 
 /// Longest wait, so that silence is noticed, ns.
 const PATROL_NS: u64 = 250_000_000;
+
+/// Longest time without a report.
+const REPORT_EVERY: DurationNs = DurationNs::from_millis(1_000);
 
 type State = std::cell::RefCell<PtpInstanceState>;
 type Instance = PtpInstance<Collector, State>;
@@ -337,6 +340,8 @@ struct Follower {
     /// Who has sent the Syncs of the line.
     parent: Option<([u8; 8], u16)>,
     changed: bool,
+    /// When the status was reported last: the bound of the error grows while nothing happens.
+    reported: MonotonicTime,
 }
 
 impl Follower {
@@ -347,6 +352,7 @@ impl Follower {
             status: TimeStatus::ptp(config),
             parent: None,
             changed: true,
+            reported: MonotonicTime::ZERO,
         }
     }
 
@@ -421,13 +427,15 @@ impl Follower {
         self.judge(event, at);
     }
 
-    /// Time passes. Whether there is something to tell.
+    /// Time passes. Whether there is something to report: once in a second at least.
     fn pass(&mut self, now: MonotonicTime) -> bool {
         self.judge(Event::Time, now);
-        std::mem::take(&mut self.changed)
+        let is_due = now.since(self.reported) >= REPORT_EVERY;
+        std::mem::take(&mut self.changed) || is_due
     }
 
     fn status(&mut self, now: MonotonicTime, guard: &Guard) -> &TimeStatus {
+        self.reported = now;
         self.status.phase = self.judge.phase();
         self.status.error_bound = self.judge.error_bound(now);
         self.status.sample = self.line.sample(now);

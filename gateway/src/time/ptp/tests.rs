@@ -241,6 +241,15 @@ fn phases(run: &[(u64, SyncPhase)]) -> Vec<SyncPhase> {
 }
 
 #[test]
+fn the_bound_of_the_error_grows_while_the_master_is_silent() {
+    let master = Clock { there: (0, 30), ..MASTER };
+    let (run, status) = run(Network::new(&[master], 90));
+    assert_eq!(run.last().unwrap().1, SyncPhase::Listening, "{run:?}");
+    // 500 ns each second since the last Sync.
+    assert!((28_000..32_000).contains(&status.error_bound), "{}", status.error_bound);
+}
+
+#[test]
 fn a_clock_of_another_rate_and_phase_is_followed() {
     for two_step in [true, false] {
         let master = Clock { two_step, ..MASTER };

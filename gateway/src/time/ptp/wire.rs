@@ -4,7 +4,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
-use profile_generic::time::MonotonicTime;
+use profile_generic::time::{DurationNs, MonotonicTime};
 
 pub use crate::sys::ptp_socket::Arrived;
 
@@ -58,15 +58,24 @@ pub struct Control {
     pub threshold: AtomicU64,
 }
 
+/// How often is looked whether the interface is still the same.
+const LOOK: DurationNs = DurationNs::from_millis(1_000);
+
 /// The sockets of the host.
 #[derive(Debug)]
 pub struct HostWire {
-    /// They are open.
-    pub sockets: PtpSockets,
-    /// The domain of the clock.
-    pub domain: u8,
-    /// What the clock is told.
-    pub control: Arc<Control>,
+    sockets: PtpSockets,
+    domain: u8,
+    control: Arc<Control>,
+    looked: MonotonicTime,
+}
+
+impl HostWire {
+    /// The wire of a clock in a domain on open sockets; `control` sets it while it runs.
+    #[must_use]
+    pub fn new(sockets: PtpSockets, domain: u8, control: Arc<Control>) -> Self {
+        Self { sockets, domain, control, looked: monotonic_now() }
+    }
 }
 
 impl Wire for HostWire {
@@ -75,6 +84,13 @@ impl Wire for HostWire {
     }
 
     fn wait(&mut self, until: MonotonicTime, buffer: &mut [u8]) -> io::Result<Option<Arrived>> {
+        let now = monotonic_now();
+        if now.since(self.looked) >= LOOK {
+            self.looked = now;
+            if self.sockets.is_replaced() {
+                return Err(io::Error::other("the interface was replaced by another one of its name"));
+            }
+        }
         self.sockets.wait(until, buffer)
     }
 

@@ -11,12 +11,15 @@ use super::event::LossReason;
 use super::station::Phase;
 
 impl Master {
-    /// Leaves out cycles that could only begin late, by more than half of their time. The grid stays where it is.
-    pub fn skip_late(&mut self, now: MonotonicTime) {
-        if self.access.is_online() && now.since(self.next_cycle).as_nanos() > self.config.cycle.as_nanos() / 2
-        {
-            self.skip_until(now - DurationNs(self.config.cycle.as_nanos() / 2));
+    /// Leaves out cycles that could only begin late, by more than half of their time. The grid stays where it is. Returns whether one
+    /// was left out.
+    pub fn skip_late(&mut self, now: MonotonicTime) -> bool {
+        let half = self.config.cycle.as_nanos() / 2;
+        let late = self.access.is_online() && now.since(self.next_cycle).as_nanos() > half;
+        if late {
+            self.skip_until(now - DurationNs(half));
         }
+        late
     }
 
     /// Moves the grid: the next cycle begins by so much later, and all that follow it.

@@ -476,8 +476,8 @@ impl South for CanBus {
         self.master.next_sync()
     }
 
-    fn skip_late(&mut self, now: MonotonicTime) {
-        self.master.skip_late(now);
+    fn skip_late(&mut self, now: MonotonicTime) -> bool {
+        self.master.skip_late(now)
     }
 
     fn shift_grid(&mut self, by: DurationNs) {

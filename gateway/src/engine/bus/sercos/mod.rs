@@ -634,8 +634,8 @@ impl South for SercosBus {
         self.master.next_cycle()
     }
 
-    fn skip_late(&mut self, now: MonotonicTime) {
-        self.master.skip_late(now);
+    fn skip_late(&mut self, now: MonotonicTime) -> bool {
+        self.master.skip_late(now)
     }
 
     fn shift_grid(&mut self, by: DurationNs) {
