@@ -244,18 +244,19 @@ impl Master {
             return false;
         }
         let cycle = self.cycle_time();
-        let frames = &mut self.net.frames;
-        let statistics = &mut self.net.journal.statistics;
+        let net = &mut self.net;
         let mut skipped = 0;
-        if frames.has_transmit() && grid::is_late(now, self.grid.send_at, cycle) {
-            frames.discard();
+        if net.frames.has_transmit() && grid::is_late(now, self.grid.send_at, cycle) {
+            net.frames.discard();
             self.grid.left_out = true;
+            // Slaves count the cycles that they see.
+            net.cycle_count = net.cycle_count.wrapping_sub(1) & 7;
             skipped += 1;
         }
-        if !frames.has_transmit() {
+        if !net.frames.has_transmit() {
             skipped += self.grid.skip_late(now, cycle);
         }
-        statistics.skipped += skipped;
+        net.journal.statistics.skipped += skipped;
         skipped > 0
     }
 

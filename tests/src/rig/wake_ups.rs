@@ -10,6 +10,7 @@ pub struct WakeUps {
     /// Longest lateness of a wake-up; each is late by a random part of it.
     pub jitter: DurationNs,
     random: Random,
+    paused_from: MonotonicTime,
     paused_until: MonotonicTime,
 }
 
@@ -20,13 +21,19 @@ impl WakeUps {
         Self {
             jitter: DurationNs::ZERO,
             random: Random::new(seed ^ 0x5741_4B45),
+            paused_from: MonotonicTime::ZERO,
             paused_until: MonotonicTime::ZERO,
         }
     }
 
     /// The engine does not run before `until`; controller, buses and drives do.
     pub fn pause(&mut self, until: MonotonicTime) {
-        self.paused_until = self.paused_until.max(until);
+        self.pause_from(MonotonicTime::ZERO, until.max(self.paused_until));
+    }
+
+    /// The engine does not run from one instant to another: what it is to do before the first one it does.
+    pub const fn pause_from(&mut self, from: MonotonicTime, until: MonotonicTime) {
+        (self.paused_from, self.paused_until) = (from, until);
     }
 
     /// How late the next wake-up is.
@@ -41,7 +48,7 @@ impl WakeUps {
     /// When a wake-up happens that is to happen at `at`.
     #[must_use]
     pub fn after_pause(&self, at: MonotonicTime) -> MonotonicTime {
-        at.max(self.paused_until)
+        if at < self.paused_from { at } else { at.max(self.paused_until) }
     }
 }
 
@@ -63,5 +70,8 @@ mod tests {
         wake_ups.pause(MonotonicTime(900));
         assert_eq!(wake_ups.after_pause(MonotonicTime(500)), MonotonicTime(900));
         assert_eq!(wake_ups.after_pause(MonotonicTime(901)), MonotonicTime(901));
+        wake_ups.pause_from(MonotonicTime(2_000), MonotonicTime(3_000));
+        let after = [1_999, 2_000, 3_001].map(|at| wake_ups.after_pause(MonotonicTime(at)));
+        assert_eq!(after, [1_999, 3_000, 3_001].map(MonotonicTime));
     }
 }

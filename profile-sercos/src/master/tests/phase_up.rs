@@ -247,6 +247,28 @@ fn late_polls_skip_cycles_and_keep_the_grid() {
 }
 
 #[test]
+fn telegrams_that_are_built_and_come_too_late_are_left_out_with_their_number() {
+    let mut rig = Rig::of(&[1]);
+    rig.up_to(Phase::CP4);
+    rig.cycles(3);
+    rig.master.prepare();
+    let due = rig.master.wake_at().unwrap();
+    assert!(!rig.master.skip_late(due + DurationNs(500_000)), "half a cycle is late, and not too late");
+    rig.now = due + DurationNs(1_200_000);
+    assert!(rig.master.skip_late(rig.now));
+    assert_eq!(
+        (rig.master.statistics().skipped, rig.master.next_cycle()),
+        (1, Some(due + DurationNs(1_000_000)))
+    );
+    let late = |violation: &Violation| {
+        violation.offender == Offender::Master && matches!(violation.rule, Rule::MstInterval { .. })
+    };
+    rig.breaking(late, |rig| rig.cycles(3));
+    let counters: Vec<u8> = rig.cycles.iter().map(|(_, byte)| byte >> 4 & 7).collect();
+    assert!(counters.windows(2).all(|pair| pair[1] == (pair[0] + 1) & 7), "{counters:?}");
+}
+
+#[test]
 fn the_application_works_in_cp2_and_cp3() {
     let mut rig = Rig::of(&[1, 2]);
     rig.auto_proceed = false;
