@@ -33,7 +33,8 @@
 //! Starting,Testing TestStop, TestComplete      test active             Stopping       Disable
 //! idle            Shutdown                                             Shutdown       TorqueOff, latch
 //! running         Shutdown                                             Stopping       TorqueOff, latch
-//! Stopping, FaultReaction, Faulted  Shutdown                           same           None, latch
+//! Stopping, FaultReaction  Shutdown                                    same           TorqueOff, latch
+//! Faulted, Shutdown Shutdown                                           same           None, latch
 //! Shutdown        ShutdownReset                                        standby        Energize, unlatch
 //! Faulted         FaultReset                   drive has torque        same           Reject
 //! Faulted         FaultReset                   fault still active      same           ResetFault

@@ -347,6 +347,16 @@ fn a_shutdown_outlasts_a_fault() {
 }
 
 #[test]
+fn a_shutdown_takes_the_torque_out_of_every_state_that_may_have_it() {
+    everywhere(|state, event, conditions, transition| {
+        if event == Event::Request(Request::Shutdown) && state.may_have_torque() {
+            assert_eq!(transition.action, Action::TorqueOff, "{state} {conditions:?}");
+            assert_eq!(transition.shutdown, Some(true), "{state} {conditions:?}");
+        }
+    });
+}
+
+#[test]
 fn a_test_runs_in_its_own_state() {
     let mut drive = ready();
     assert_eq!(drive.request(Request::Test).next, DriveState::Starting);

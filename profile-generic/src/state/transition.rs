@@ -147,6 +147,8 @@ impl DriveState {
             Request::Shutdown if self.is_running() => {
                 Transition::to(Self::Stopping, Action::TorqueOff).latching()
             }
+            // Category 0 at once, also out of a stop under way (Volume 9, attribute 629).
+            Request::Shutdown if self.may_have_torque() => Transition::to(self, Action::TorqueOff).latching(),
             Request::Shutdown => self.stay().latching(),
             Request::ShutdownReset => self.on_shutdown_reset(conditions),
             Request::FaultReset => self.on_fault_reset(conditions),
