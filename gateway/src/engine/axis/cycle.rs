@@ -182,10 +182,12 @@ impl AxisChannel {
 
     /// Time passes, without a telegram of the drive: states and resets that have a limit come to it.
     pub fn tick(&mut self, now: MonotonicTime, system: SystemTime) {
+        if self.holds() {
+            // A hold is a stop that has ended: a movement or a silence that follows has a time limit of its own.
+            self.drive.since = now;
+        }
         let limit = match self.state() {
             DriveState::Starting => Some(START_TIME_OUT),
-            // A hold is a stop that has ended.
-            DriveState::FaultReaction if self.holds() => None,
             DriveState::Stopping | DriveState::FaultReaction => Some(STOP_TIME_OUT),
             _ => None,
         };
@@ -197,6 +199,9 @@ impl AxisChannel {
         }
         self.diagnosis.tick(now);
         self.advance_sequence(now, system);
+        if self.orders.hold_unwanted {
+            self.end_hold(now, system);
+        }
         self.advance_reset(now, system);
         self.feedback.state = self.state();
         self.feedback.inhibits = self.drive.machine.conditions().inhibits;
@@ -504,6 +509,7 @@ impl AxisChannel {
         let changes = self.feedback.state != transition.next;
         if changes {
             self.drive.since = now;
+            self.orders.hold_unwanted = false;
             self.follow_sequence(now, transition.next);
             self.feedback.state = transition.next;
         }

@@ -304,9 +304,12 @@ impl AxisChannel {
     /// Whether the drive stands with torque because the reaction to a fault is to hold the position.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.state() == DriveState::FaultReaction
-            && self.drive.action == Action::Halt
-            && self.feedback.report == Report::Halted
+        self.is_to_hold() && self.feedback.report == Report::Halted
+    }
+
+    /// Whether the reaction to a fault is to hold the position; the axis may still move.
+    fn is_to_hold(&self) -> bool {
+        self.state() == DriveState::FaultReaction && self.drive.action == Action::Halt
     }
 
     /// The newest feedback.

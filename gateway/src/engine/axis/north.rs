@@ -160,7 +160,11 @@ impl AxisChannel {
             // Out of a hold, or of a stop that has not ended: the torque is there already.
             Intent::Enable if self.state() == DriveState::Operating => self.prepare_start(now),
             Intent::Enable | Intent::Abort => {}
-            _ => self.end_hold(now, system),
+            // An axis that is not halted in this very cycle loses its torque as soon as it is.
+            _ => {
+                self.orders.hold_unwanted = self.is_to_hold();
+                self.end_hold(now, system);
+            }
         }
     }
 

@@ -71,6 +71,8 @@ pub(super) struct Orders {
     wish: Wish,
     /// An enable was rejected and is still asked for.
     enable_pending: bool,
+    /// The wish is an axis without torque, and the reaction to a fault would hold it.
+    pub hold_unwanted: bool,
     /// The reset that was carried out last.
     reset_id: u32,
     reset: Option<Reset>,
@@ -110,6 +112,7 @@ impl Orders {
     pub fn want(&mut self, wish: Wish) {
         self.wish = wish;
         self.enable_pending = false;
+        self.hold_unwanted = false;
     }
 
     /// The request of an enable or a test was rejected: one that came in the very cycle in which the drive was not ready is still

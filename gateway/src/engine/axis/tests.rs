@@ -232,3 +232,72 @@ fn rejected_enable_is_tried_again_and_ends_with_a_fault_or_another_north_side() 
         assert_eq!(axis.state(), state, "{what}");
     }
 }
+
+/// An axis in operation that a fault tells to hold its position.
+fn told_to_hold() -> AxisChannel {
+    let mut axis = operating();
+    hold(&mut axis);
+    axis
+}
+
+fn hold(axis: &mut AxisChannel) {
+    let fault = Fault::new(FaultCause::CONTROLLER_ABORT, SYSTEM).with_reaction(Reaction::HoldPosition);
+    axis.take_fault(NOW, SYSTEM, fault);
+    assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::Halt));
+}
+
+#[test]
+fn hold_has_no_time_limit_and_a_later_movement_has_its_own() {
+    let held = NOW + STOP_TIME_OUT + DurationNs::from_secs(1);
+    let mut axis = told_to_hold();
+    axis.report(NOW, SYSTEM, Report::Halted);
+    axis.report(held, SYSTEM, Report::Halted);
+    // Faster than zero speed: CiA 402 calls that not halted.
+    for now in [held + DurationNs(1), held + STOP_TIME_OUT] {
+        axis.report(now, SYSTEM, Report::Operating);
+        assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::Halt));
+    }
+    axis.report(held + STOP_TIME_OUT + DurationNs(1), SYSTEM, Report::Operating);
+    assert_eq!((axis.state(), axis.action()), (DriveState::Faulted, Action::TorqueOff));
+    // A drive that is not heard for a moment keeps it as well.
+    let mut axis = told_to_hold();
+    axis.report(held, SYSTEM, Report::Halted);
+    axis.report(held + DurationNs(1), SYSTEM, Report::Silent);
+    assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::Halt));
+    axis.report(held + SILENCE_TIME_OUT + DurationNs(2), SYSTEM, Report::Silent);
+    assert_eq!((axis.state(), axis.action()), (DriveState::Faulted, Action::Disable));
+}
+
+#[test]
+fn wish_without_torque_ends_a_hold_that_is_reached_later() {
+    let wishes = [
+        Wish { intent: Intent::Shutdown, request: Some(Request::Shutdown) },
+        Wish { intent: Intent::Disable, request: Some(Request::Disable) },
+        Wish::default(),
+    ];
+    for wish in wishes {
+        let mut axis = told_to_hold();
+        axis.report(NOW, SYSTEM, Report::Operating);
+        axis.take_wish(NOW, SYSTEM, wish);
+        axis.report(NOW, SYSTEM, Report::Halted);
+        assert!(matches!(axis.action(), Action::Disable | Action::TorqueOff), "{wish:?}: {}", axis.action());
+        assert_eq!(cause(&axis), Some(FaultCause::CONTROLLER_ABORT), "{wish:?}: the fault stays");
+    }
+    // A wish holds until the next one.
+    let abort = Wish { intent: Intent::Abort, request: Some(Request::Abort) };
+    let mut axis = told_to_hold();
+    axis.take_wish(NOW, SYSTEM, Wish::default());
+    axis.take_wish(NOW, SYSTEM, abort);
+    axis.report(NOW, SYSTEM, Report::Halted);
+    assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::Halt));
+    // And it is not of the next hold.
+    let mut axis = told_to_hold();
+    axis.take_wish(NOW, SYSTEM, Wish::default());
+    axis.report(NOW, SYSTEM, Report::Ready);
+    axis.want_reset(NOW, SYSTEM, 1);
+    axis.request(NOW, SYSTEM, Request::Enable);
+    axis.report(NOW, SYSTEM, Report::Operating);
+    hold(&mut axis);
+    axis.report(NOW, SYSTEM, Report::Halted);
+    assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::Halt));
+}
