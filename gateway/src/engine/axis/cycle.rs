@@ -624,14 +624,21 @@ impl AxisChannel {
         }
         self.end_hold(now, system);
         let stops = matches!(self.state(), DriveState::FaultReaction | DriveState::Stopping);
-        if self.orders.advance_reset(now, stops) == Some(ResetStep::Clear) {
-            self.faults.reset(self.feedback.report == Report::Silent);
+        let begins = self.orders.advance_reset(now, stops) == Some(ResetStep::Clear);
+        let silent = self.feedback.report == Report::Silent;
+        if begins || silent && self.orders.resets() {
+            self.faults.reset(silent);
             self.diagnosis.end_search();
+        }
+        // A drive that is not heard is not reset: the axis stays faulted until a reset after it is heard again.
+        let lost = silent && self.faults.first().is_some();
+        if begins && !lost {
             let transition = self.drive.machine.clear_faults();
             self.follow(now, system, transition);
             self.request(now, system, Request::FaultReset);
         }
-        if self.orders.end_reset(now, self.state() == DriveState::Faulted) == Some(ResetStep::Abandon) {
+        let faulted = self.state() == DriveState::Faulted;
+        if self.orders.end_reset(now, faulted, lost) == Some(ResetStep::Abandon) {
             self.drive.machine.abandon_reset();
         }
     }

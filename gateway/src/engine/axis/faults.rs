@@ -111,10 +111,11 @@ impl Faults {
         }
     }
 
-    /// A reset: what has happened is over. A drive that is not there is no event: it is `silent` still.
+    /// A reset: what has happened is over. A drive that is not there is no event: it is `silent` still, and that is the fault.
     pub fn reset(&mut self, silent: bool) {
-        self.first = None;
         self.set.clear_all(Origin::Event, |cause| silent && cause == FaultCause::SOUTH_SILENCE);
+        let silence = self.set.iter().find(|active| active.origin == Origin::Event);
+        self.first = silence.map(|active| self.decided(active.fault, active.origin));
     }
 
     /// What the fault that has just come is about: why the command was lost.
@@ -211,10 +212,12 @@ mod tests {
         );
         let causes =
             |faults: &Faults| faults.set().iter().map(|active| active.fault.cause).collect::<Vec<_>>();
+        faults.stop_for(fault(FaultCause::CONFIGURATION, 1));
         faults.reset(true);
         assert_eq!(causes(&faults), [FaultCause::SOUTH_SILENCE, FaultCause::OVER_VOLTAGE]);
+        assert_eq!(first(&faults), Some((FaultCause::SOUTH_SILENCE, 1)));
         faults.reset(false);
-        assert_eq!(causes(&faults), [FaultCause::OVER_VOLTAGE]);
+        assert_eq!((causes(&faults), first(&faults)), (vec![FaultCause::OVER_VOLTAGE], None));
     }
 
     #[test]

@@ -91,7 +91,7 @@ pub(super) struct Orders {
 pub(super) enum ResetStep {
     /// The faults are to be cleared now.
     Clear,
-    /// It takes too long: it is not waited for any longer.
+    /// It takes too long, or the drive is not heard: it is not waited for any longer.
     Abandon,
 }
 
@@ -172,15 +172,15 @@ impl Orders {
         Some(ResetStep::Clear)
     }
 
-    /// Ends a reset under way when the axis is not `faulted` any more, or its time is over.
-    pub fn end_reset(&mut self, now: MonotonicTime, faulted: bool) -> Option<ResetStep> {
+    /// Ends a reset under way when the axis is not `faulted` any more, its drive is `lost`, or its time is over.
+    pub fn end_reset(&mut self, now: MonotonicTime, faulted: bool, lost: bool) -> Option<ResetStep> {
         let reset = self.reset.filter(|reset| reset.begun)?;
-        let late = now.since(reset.since) > RESET_TIME_OUT;
-        if !faulted || late {
+        let in_vain = lost || now.since(reset.since) > RESET_TIME_OUT;
+        if !faulted || in_vain {
             self.reset = None;
             self.reset_id = reset.id;
         }
-        late.then_some(ResetStep::Abandon)
+        in_vain.then_some(ResetStep::Abandon)
     }
 }
 
@@ -198,17 +198,21 @@ mod tests {
         orders.begin_reset(NOW, 7);
         assert!(!orders.is_new_reset(7) && orders.has_reset() && !orders.resets());
         assert_eq!(orders.advance_reset(NOW, true), None);
-        assert_eq!(orders.end_reset(NOW, false), None, "it has not begun");
+        assert_eq!(orders.end_reset(NOW, false, false), None, "it has not begun");
         assert_eq!(orders.reset_id(), 0);
         assert_eq!(orders.advance_reset(NOW, false), Some(ResetStep::Clear));
         assert_eq!(orders.advance_reset(NOW, false), None, "once");
-        assert_eq!((orders.end_reset(NOW + RESET_TIME_OUT, true), orders.resets()), (None, true));
-        assert_eq!((orders.end_reset(NOW, false), orders.reset_id()), (None, 7));
+        assert_eq!((orders.end_reset(NOW + RESET_TIME_OUT, true, false), orders.resets()), (None, true));
+        assert_eq!((orders.end_reset(NOW, false, false), orders.reset_id()), (None, 7));
         orders.begin_reset(NOW, 8);
         orders.advance_reset(NOW, false);
         let late = NOW + RESET_TIME_OUT + DurationNs(1);
-        assert_eq!((orders.end_reset(late, true), orders.reset_id()), (Some(ResetStep::Abandon), 8));
+        assert_eq!((orders.end_reset(late, true, false), orders.reset_id()), (Some(ResetStep::Abandon), 8));
         assert!(!orders.has_reset());
+        orders.begin_reset(NOW, 9);
+        assert_eq!(orders.end_reset(NOW, true, true), None, "it has not begun");
+        orders.advance_reset(NOW, false);
+        assert_eq!((orders.end_reset(NOW, true, true), orders.reset_id()), (Some(ResetStep::Abandon), 9));
     }
 
     #[test]

@@ -301,3 +301,43 @@ fn wish_without_torque_ends_a_hold_that_is_reached_later() {
     axis.report(NOW, SYSTEM, Report::Halted);
     assert_eq!((axis.state(), axis.action()), (DriveState::FaultReaction, Action::Halt));
 }
+
+#[test]
+fn silent_drive_keeps_its_fault_until_a_reset_after_it_is_heard() {
+    let silence = Some(FaultCause::SOUTH_SILENCE);
+    let late = NOW + SILENCE_TIME_OUT + DurationNs(1);
+    let silent: [fn(&mut AxisChannel); 2] = [
+        |axis| {
+            axis.report(NOW, SYSTEM, Report::Silent);
+            axis.report(NOW + SILENCE_TIME_OUT + DurationNs(1), SYSTEM, Report::Silent);
+            assert_eq!((axis.state(), cause(axis)), (DriveState::Faulted, Some(FaultCause::SOUTH_SILENCE)));
+            axis.want_reset(NOW, SYSTEM, 1);
+        },
+        |axis| {
+            axis.report(NOW, SYSTEM, Report::Faulted);
+            axis.want_reset(NOW, SYSTEM, 1);
+            assert_eq!((axis.state(), axis.reset_id()), (DriveState::Faulted, 0), "the drive is waited for");
+            axis.report(NOW, SYSTEM, Report::Silent);
+        },
+    ];
+    for silent in silent {
+        let mut axis = operating();
+        silent(&mut axis);
+        assert_eq!((axis.state(), cause(&axis), axis.reset_id()), (DriveState::Faulted, silence, 1));
+        axis.report(late, SYSTEM, Report::Ready);
+        assert_eq!((axis.state(), cause(&axis)), (DriveState::Faulted, silence));
+        axis.want_reset(late, SYSTEM, 2);
+        assert_eq!((axis.state(), cause(&axis), axis.reset_id()), (DriveState::Ready, None, 2));
+        axis.request(late, SYSTEM, Request::Enable);
+        assert_eq!((axis.state(), cause(&axis)), (DriveState::Starting, None));
+    }
+}
+
+#[test]
+fn configuration_fault_of_a_drive_that_was_never_heard_is_reset() {
+    let mut axis = AxisChannel::new(Limits::default(), Reaction::HoldPosition, true);
+    axis.refuse_configuration(NOW, SYSTEM);
+    assert_eq!((axis.state(), cause(&axis)), (DriveState::Faulted, Some(FaultCause::CONFIGURATION)));
+    axis.want_reset(NOW, SYSTEM, 1);
+    assert_eq!((axis.state(), cause(&axis), axis.reset_id()), (DriveState::NotReady, None, 1));
+}
