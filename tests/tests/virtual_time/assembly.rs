@@ -823,11 +823,14 @@ fn a_reset_counts_whoever_has_given_one_before() {
 
 /// The gateway of one axis with the assemblies of speed and torque; the motor has 1 Nm. Torque is in 1024ths of a newton metre.
 fn with_torque(mode: &str, velocity_limit: &str) -> Plc {
-    stopping_with(mode, velocity_limit, "ramped-decel-and-disable")
+    stopping_with(mode, velocity_limit, "ramped-decel-and-disable", "")
 }
 
-/// The same with what a lost command does.
-fn stopping_with(mode: &str, velocity_limit: &str, action: &str) -> Plc {
+/// Modes of a drive without velocity control.
+const MODES: &str = "modes = [\"position\", \"torque\"]";
+
+/// The same with what a lost command does, and a line for the drive.
+fn stopping_with(mode: &str, velocity_limit: &str, action: &str, drive: &str) -> Plc {
     let limits = format!("following_error = 0.5\nvelocity = {velocity_limit}\nacceleration = 100.0");
     let motor = format!(
         "motion_resolution = 1_000_000\nmotor = {{ rated_torque = 1.0 }}\non_command_loss = \"{action}\""
@@ -839,7 +842,8 @@ fn stopping_with(mode: &str, velocity_limit: &str, action: &str) -> Plc {
         .replace("connection_format = \"fixed\"\n", "")
         .replacen("following_error = 0.5", &limits, 1)
         .replacen("motion_resolution = 1_000_000", &motor, 1)
-        .replacen("[device.identity]", &assembly, 1);
+        .replacen("[device.identity]", &assembly, 1)
+        .replacen("address = 1", &format!("address = 1\n{drive}"), 1);
     let mut plc = Plc::new(Settings { configuration, ..Settings::fixed() }, RPI);
     plc.connect();
     plc
@@ -904,6 +908,22 @@ fn a_torque_in_newton_metres_accelerates_the_axis_and_comes_back() {
     assert_eq!(plc.rig.engine.axes()[0].fault(), None);
 }
 
+/// A drive without a velocity mode cannot follow a ramp out of torque control: it brakes by itself, with no torque of before.
+#[test]
+fn the_end_of_a_torque_is_a_stop_of_a_drive_without_velocity_control() {
+    let mut plc = stopping_with("torque", "20.0", "ramped-decel-and-disable", MODES);
+    pushed(&mut plc, 51, 200);
+    assert!(plc.speed() > 5 * NANO, "{}", plc.speed());
+    assert!(plc.rig.engine.axes()[0].command().torque > Torque::ZERO);
+    refer(&mut plc, 0x60, 0, 51);
+    plc.run_for(12);
+    assert_eq!(plc.rig.engine.axes()[0].command().torque, Torque::ZERO);
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    assert!(plc.speed().abs() < NANO / 10, "{}", plc.speed());
+    plc.run_for(200);
+    assert_eq!(plc.rig.engine.axes()[0].fault(), None);
+}
+
 /// In speed control the torque reference is without effect, however large it is; the actual torque is shown all the same.
 #[test]
 fn a_torque_reference_is_without_effect_in_speed_control() {
@@ -960,7 +980,7 @@ fn the_drive_object_says_what_the_numbers_count() {
 fn a_loss_in_torque_control_stops_as_configured() {
     for (action, ramps) in [("ramped-decel-and-disable", true), ("disable-and-coast", false)] {
         for event in ["idle", "silence", "closed"] {
-            let mut plc = stopping_with("torque", "20.0", action);
+            let mut plc = stopping_with("torque", "20.0", action, "");
             pushed(&mut plc, 51, 100);
             let speed = plc.speed();
             assert!(speed > 3 * NANO, "{speed}");

@@ -597,7 +597,9 @@ impl AxisChannel {
             Order::Halt => self.request(now, system, Request::Stop),
             Order::Ramp => {
                 let (acts_at, actual) = (self.set_points.acts_at(), self.feedback.velocity);
-                if !self.start_stop.begin_ramp(acts_at, &mut self.command, actual) {
+                let by_velocity =
+                    self.south().is_some_and(|program| program.has_mode(OperatingMode::Velocity));
+                if !self.start_stop.begin_ramp(acts_at, &mut self.command, actual, by_velocity) {
                     self.begin_stop(now, system, self.start_stop.by_drive());
                 }
             }

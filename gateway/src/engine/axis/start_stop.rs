@@ -126,12 +126,13 @@ impl StartStop {
     }
 
     /// The command goes to rest, from where it is at `acts_at`, not from what the drive has made of it: so it does not step. `false` when
-    /// the drive has to brake by itself.
+    /// the drive has to brake by itself; out of torque control a ramp goes `by_velocity`, where the drive has that mode.
     pub fn begin_ramp(
         &mut self,
         acts_at: MonotonicTime,
         command: &mut AxisCommand,
         actual: Velocity,
+        by_velocity: bool,
     ) -> bool {
         if command.interpolation == InterpolationSource::Drive {
             // A drive that makes its way by itself brakes by itself.
@@ -139,6 +140,7 @@ impl StartStop {
         }
         let velocity = match command.mode {
             OperatingMode::Position | OperatingMode::Velocity => command.velocity,
+            _ if !by_velocity => return false,
             _ => {
                 command.mode = OperatingMode::Velocity;
                 actual
@@ -228,7 +230,7 @@ mod tests {
             velocity: Velocity(2 * UNIT),
             ..AxisCommand::default()
         };
-        assert!(axis.begin_ramp(NOW, &mut command, Velocity(UNIT)));
+        assert!(axis.begin_ramp(NOW, &mut command, Velocity(UNIT), true));
         let at = |millis| axis.led_by_gateway(NOW + DurationNs::from_millis(millis), None);
         assert_eq!(at(0), (Some(Position(7 * UNIT)), Some(Velocity(2 * UNIT))));
         // 2 u/s at 10 u/s2: 0.2 s and 0.2 u.
@@ -242,11 +244,13 @@ mod tests {
     fn torque_is_ramped_in_velocity_from_the_actual_one_and_a_drive_on_its_own_way_brakes_itself() {
         let mut axis = start_stop();
         let mut command = AxisCommand { mode: OperatingMode::Torque, ..AxisCommand::default() };
-        assert!(axis.begin_ramp(NOW, &mut command, Velocity(UNIT)));
+        assert!(!axis.begin_ramp(NOW, &mut command, Velocity(UNIT), false), "the drive has no such mode");
+        assert_eq!(command.mode, OperatingMode::Torque);
+        assert!(axis.begin_ramp(NOW, &mut command, Velocity(UNIT), true));
         assert_eq!(command.mode, OperatingMode::Velocity);
         assert_eq!(axis.led_by_gateway(NOW, None).1, Some(Velocity(UNIT)));
         let mut command = AxisCommand { interpolation: InterpolationSource::Drive, ..command };
-        assert!(!axis.begin_ramp(NOW, &mut command, Velocity(UNIT)));
+        assert!(!axis.begin_ramp(NOW, &mut command, Velocity(UNIT), true));
     }
 
     #[test]
