@@ -14,7 +14,8 @@ use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::forward_open::ForwardOpenReply;
 use profile_generic::fault::FaultCause;
 use profile_generic::parameter::Parameter;
-use profile_generic::quantity::Torque;
+use profile_generic::quantity::{Torque, Velocity};
+use profile_generic::sequence::StopMethod;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
 use profile_sercos::wire::idn::Idn;
@@ -113,6 +114,20 @@ impl Turntable for Plc {
         }
         (away, fastest)
     }
+}
+
+/// An axis stops as it is configured also before a controller has connected, and under local control.
+#[test]
+fn axes_stop_as_configured_before_the_first_connection() {
+    let mut plc = plc("{}");
+    let settings = |plc: &Plc| [0, 1].map(|axis| *plc.rig.engine.axes()[axis].stop_settings());
+    let before = settings(&plc);
+    // A hundredth of the velocity limit; 1 mm/s where there is none.
+    assert_eq!(before.map(|stops| stops.times.zero_speed), [Velocity(NANO / 5), Velocity(NANO)]);
+    assert_eq!(before.map(|stops| stops.plan.method), [StopMethod::Ramp; 2]);
+    plc.connect();
+    plc.run_for(40);
+    assert_eq!(settings(&plc), before);
 }
 
 /// What the nameplate of an axis says is compared with its drive here too.

@@ -26,8 +26,7 @@ use profile_generic::time_base::TimeBase;
 
 use super::AssemblyAxis;
 use crate::engine::axis::{
-    AxisChannel, Intent, NorthPoints, Owner, READY_TIME_OUT, START_TIME_OUT, StopSettings, Target, Updates,
-    Wish,
+    AxisChannel, Intent, NorthPoints, Owner, READY_TIME_OUT, START_TIME_OUT, Target, Updates, Wish,
 };
 use crate::engine::generator::{self, Misfit, POSITION, ProfileGenerator, SetPoint, Standstill};
 
@@ -77,7 +76,6 @@ pub(super) struct PlcAxis {
     /// Its instance in the device.
     pub instance: u16,
     pub scale: Scale,
-    stops: StopSettings,
     handshake: Handshake,
     source: Source,
     /// The mode in use.
@@ -112,7 +110,6 @@ impl PlcAxis {
             number: config.axis,
             instance: config.instance,
             scale: config.scale,
-            stops: config.stops,
             handshake: Handshake::default(),
             source: Source::None,
             mode: 0,
@@ -220,11 +217,10 @@ impl PlcAxis {
         }
     }
 
-    /// How the axis stops is what the configuration says from the moment at which a controller has it.
+    /// A controller that has connected counts its orders by itself, and was refused none.
     fn connect(&mut self, axis: &mut AxisChannel) {
         let connected = axis.has_controller();
         if connected && !self.connected {
-            axis.set_stop_settings(self.stops);
             axis.begin_north();
             self.refusal = Refusal::NONE;
         }

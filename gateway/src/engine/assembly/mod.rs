@@ -29,7 +29,7 @@ use profile_generic::time::{DurationNs, MonotonicTime};
 use self::axis::{Around, PlcAxis};
 use self::connections::{Connections, Counts};
 use self::parameters::Parameters;
-use super::axis::{AxisChannel, StopSettings};
+use super::axis::AxisChannel;
 use super::bus::{Answer, Buses};
 use super::north::{Exchange, North};
 use super::notice::{Notice, axis_number};
@@ -52,8 +52,6 @@ pub struct AssemblyAxis {
     pub instance: u16,
     /// Its counts.
     pub scale: Scale,
-    /// How it stops.
-    pub stops: StopSettings,
 }
 
 /// A device with assemblies.

@@ -142,7 +142,7 @@ pub struct Host {
 pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, BuildError> {
     let (buses, commissioners) = buses(config, host, &mapping)?;
     let axes = config.axes.iter().map(|axis| channel(axis, &mapping)).collect::<Result<Vec<_>, _>>()?;
-    let (axes, programs): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
+    let (mut axes, programs): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
     let mut devices = Vec::with_capacity(config.devices.len());
     let mut assemblies = Vec::new();
     let mut adapters = Vec::with_capacity(config.devices.len());
@@ -159,8 +159,12 @@ pub fn build(config: &Config, mapping: Mapping, host: Host) -> Result<Built, Bui
         let configs: Vec<_> = members.iter().map(member).collect();
         let number = u8::try_from(number).unwrap_or(u8::MAX);
         if let Some(layout) = &device.assembly {
-            let axes: Vec<_> = members.iter().map(|(number, axis)| assembly_axis(*number, axis)).collect();
-            assemblies.push(AssemblyChannel::new(number, layout.clone(), device_end, &axes));
+            let of_assembly: Vec<_> =
+                members.iter().map(|(number, axis)| assembly_axis(*number, axis)).collect();
+            for (number, axis) in &members {
+                axes[*number].set_stop_settings(assembly_stops(axis));
+            }
+            assemblies.push(AssemblyChannel::new(number, layout.clone(), device_end, &of_assembly));
             adapters.push((with_sheet(device, &members, host), adapter_end));
             continue;
         }
@@ -318,23 +322,27 @@ fn stop_defaults(axis: &Axis) -> StopDefaults {
     StopDefaults { zero_speed: Velocity(zero_speed), deceleration: axis.limits.acceleration }
 }
 
-/// An axis of a device with assemblies. A disable stops it on a ramp of its acceleration limit, or by the drive where it has
-/// none, and takes its torque away.
-fn assembly_axis(number: usize, axis: &Axis) -> AssemblyAxis {
+/// How an axis of a device with assemblies stops, whoever controls it: on a ramp of its acceleration limit, or by the drive where it
+/// has none, and without torque then.
+fn assembly_stops(axis: &Axis) -> StopSettings {
     let StopDefaults { zero_speed, deceleration } = stop_defaults(axis);
     let method = if deceleration.is_some() { StopMethod::Ramp } else { StopMethod::Decelerate };
+    StopSettings {
+        plan: StopPlan { method, hold: false },
+        times: SequenceTimes { zero_speed, ..SequenceTimes::default() },
+        deceleration,
+        ..StopSettings::default()
+    }
+}
+
+/// An axis of a device with assemblies.
+fn assembly_axis(number: usize, axis: &Axis) -> AssemblyAxis {
     AssemblyAxis {
         axis: number,
         instance: u16::from(axis.instance),
         scale: Scale {
             counts_per_unit: axis.motion_resolution,
             rated_torque: axis.nameplate.value(Parameter::MOTOR_RATED_TORQUE).unwrap_or(0),
-        },
-        stops: StopSettings {
-            plan: StopPlan { method, hold: false },
-            times: SequenceTimes { zero_speed, ..SequenceTimes::default() },
-            deceleration,
-            ..StopSettings::default()
         },
     }
 }
