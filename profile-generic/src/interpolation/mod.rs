@@ -144,7 +144,7 @@ pub enum UpdateError {
         target: MonotonicTime,
     },
     /// Its target is further in the future than updates are kept for.
-    #[error("target {target} is too far ahead: {MAX_SEGMENTS} updates wait for their time already")]
+    #[error("target {target} is too far ahead: updates are kept for {MAX_SEGMENTS} periods")]
     Ahead {
         /// The target of this update.
         target: MonotonicTime,

@@ -668,6 +668,31 @@ fn stale_stamps_and_a_jump_stop_the_axis() {
     assert!((plc.place() - place).abs() < NANO / 2, "it did not jump: {} {place}", plc.place());
 }
 
+/// The first set-point has none before it that would show how wrong its stamp is.
+#[test]
+fn a_first_stamp_far_ahead_is_a_lost_command() {
+    for ahead in [DurationNs::from_secs(2), RPI * 3] {
+        let wrong = ahead > RPI * 3;
+        let mut plc = plc("{ layout = \"motion\" }");
+        plc.connect();
+        plc.word(Control::empty());
+        plc.run_for(40);
+        plc.word(Control::ENABLE);
+        let mut enabled = 0;
+        for _ in 0..500 {
+            // One set-point, or two, until the wrong stamp has been taken.
+            let ahead = if enabled < 2 { ahead } else { RPI * 3 };
+            let stamp = plc.rig.system().0 + ahead.magnitude();
+            plc.set(0, "time_stamp", stamp.cast_signed());
+            plc.scan();
+            enabled += i32::from(plc.rig.engine.axes()[0].state() == DriveState::Operating);
+        }
+        assert_eq!(plc.is(Status::ENABLED), !wrong, "{ahead}");
+        let fault = plc.rig.engine.axes()[0].fault().map(|fault| fault.cause);
+        assert_eq!(fault, wrong.then_some(FaultCause::COMMAND_LOST), "{ahead}");
+    }
+}
+
 #[test]
 fn set_points_that_stop_coming_in_run_are_a_lost_command() {
     let mut plc = cyclic();

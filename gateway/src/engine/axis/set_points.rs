@@ -3,7 +3,8 @@
 use profile_generic::fault::FaultCause;
 use profile_generic::image::{AxisCommand, AxisFeedback, FeedbackSet};
 use profile_generic::interpolation::{
-    FineInterpolator, InterpolatorConfig, MAX_EXTRAPOLATION, Motion, Quality, TargetUpdate, UpdateError,
+    FineInterpolator, InterpolatorConfig, MAX_EXTRAPOLATION, MAX_GAP, Motion, Quality, TargetUpdate,
+    UpdateError,
 };
 use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::quantity::{Acceleration, Position, Quantity, Velocity};
@@ -197,6 +198,12 @@ impl SetPoints {
         self.count_command();
         let acts_at = self.acts_at;
         let interpolator = self.interpolator.as_mut().ok_or(Loss::NoPeriod)?;
+        let period = interpolator.config().period;
+        let target = target.unwrap_or_else(|| target_update.target(now, period));
+        // The interpolator compares targets with each other; the first one has none before it.
+        if target.since(now + self.ahead) > period * MAX_GAP {
+            return Err(Loss::Update(UpdateError::Ahead { target }));
+        }
         if before.first {
             match self.caught.take() {
                 // From the speed that it has, as the ramp generator would begin there (clause 5-2.6.5.4).
@@ -211,8 +218,6 @@ impl SetPoints {
             // On the move the new command begins where the old one has led the axis.
             interpolator.change(acts_at, target_update, (before.command.mode, fresh.mode), &actual);
         }
-        let period = interpolator.config().period;
-        let target = target.unwrap_or_else(|| target_update.target(now, period));
         match interpolator.update(target, fresh) {
             // Set-points overtaken by newer ones; silence is watched elsewhere.
             Ok(()) | Err(UpdateError::NotNewer { .. }) => Ok(()),
@@ -398,6 +403,27 @@ mod tests {
         points.keep_updates(UPDATES, &feedback(0));
         assert_eq!(points.period(), Some(PERIOD));
         assert_eq!(points.interpolate(at(0), &command(5), &before, &feedback(0), way), Ok(()));
+    }
+
+    #[test]
+    fn set_points_too_far_ahead_are_a_lost_command_the_first_ones_too() {
+        let mut points = SetPoints::new();
+        points.keep_updates(UPDATES, &feedback(0));
+        points.begin_cycle(&cycle(0));
+        // The cycle is 1 ms ahead, and updates are kept for 16 periods.
+        let last = at(1) + PERIOD * MAX_GAP;
+        for first in [true, false] {
+            let before = Before { command: command(0), led: true, first };
+            let mut take = |target: MonotonicTime| {
+                let way = (TargetUpdate::Interpolate, Some(target));
+                points.interpolate(at(0), &command(5), &before, &feedback(0), way)
+            };
+            for target in [last + DurationNs(1), at(2_000)] {
+                let ahead = UpdateError::Ahead { target };
+                assert_eq!(take(target), Err(Loss::Update(ahead)), "first: {first}");
+            }
+            assert_eq!(take(last), Ok(()), "first: {first}");
+        }
     }
 
     #[test]
