@@ -101,6 +101,8 @@ impl BasicDrive {
             Event::Request(Request::FaultReset) => {
                 conditions.reset_pending = self.state == DriveState::Faulted;
             }
+            // A shutdown is latched beneath the fault, and the reset leads to it.
+            Event::Request(Request::Shutdown) => {}
             Event::Request(_) => conditions.reset_pending = false,
             Event::Report(report) => {
                 conditions.initialised = !matches!(report, Report::NotReady | Report::Silent);

@@ -334,6 +334,17 @@ fn a_reset_that_was_given_up_or_overtaken_does_not_clear_later() {
 }
 
 #[test]
+fn a_shutdown_is_latched_beneath_a_reset_under_way_and_does_not_end_it() {
+    let mut drive = operating();
+    drive.report(Report::Faulted);
+    drive.request(Request::FaultReset);
+    drive.request(Request::Shutdown);
+    assert_eq!(drive.state(), DriveState::Faulted);
+    assert_eq!(drive.report(Report::Ready).next, DriveState::Shutdown);
+    assert_eq!(drive.request(Request::ShutdownReset).next, DriveState::Ready);
+}
+
+#[test]
 fn a_shutdown_outlasts_a_fault() {
     let mut drive = operating();
     assert_eq!(drive.request(Request::Shutdown).action, Action::TorqueOff);

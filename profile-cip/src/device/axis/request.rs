@@ -110,6 +110,11 @@ impl Axis {
                 Err(RefusalReason::State(self.machine.state))
             }
             AxisControl::SHUTDOWN => {
+                // Only a Shutdown Reset that comes after it ends it (clause 5-2.6.2.13). One that was cancelled and still waits for the
+                // drive resets the faults alone.
+                if self.orders.reset == Some(AxisControl::SHUTDOWN_RESET) {
+                    self.orders.reset = Some(AxisControl::FAULT_RESET);
+                }
                 self.machine.shutdown = true;
                 self.fire(AxisEvent::Shutdown);
                 Ok(false)
@@ -132,6 +137,8 @@ impl Axis {
             }
             AxisControl::ABORT => {
                 let stop = self.sequence_settings.abort;
+                // A reset that still waits for the drive is older than the fault of this request.
+                self.orders.reset = None;
                 self.faults.find(fault_code::CONTROLLER_INITIATED, 0, stop, context.system_time);
                 Ok(false)
             }

@@ -54,6 +54,9 @@
 //! clears fault and shutdown together and leads to Pre-Charge; for feedback only, which has none, where a Fault Reset
 //! without SD leads. "Any" state is one with a connection to close or lose: not Off, not Self Test.
 //!
+//! One row is narrower than in Table 5-2.97, by the text of the same clause: a stop that ends in Shutdown (SD) is no place for a flying
+//! start.
+//!
 //! A device that fails its self test has an Initialization Fault (clause 5-2.6.2.2), another row that the tables lack.
 
 use core::fmt;
@@ -242,7 +245,9 @@ impl AxisState {
             }
             (Self::Stopped, AxisEvent::StartInhibit) => Some(Self::StartInhibited),
             (Self::Stopped, AxisEvent::Enable | AxisEvent::Test) => Some(Self::Starting),
-            (Self::Stopping, AxisEvent::Enable) if conditions.flying_start => Some(Self::Starting),
+            (Self::Stopping, AxisEvent::Enable) if conditions.flying_start && !conditions.shutdown => {
+                Some(Self::Starting)
+            }
             (Self::Starting, AxisEvent::StartComplete) => {
                 Some(if conditions.in_process { Self::Testing } else { Self::Running })
             }

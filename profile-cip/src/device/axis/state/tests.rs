@@ -29,7 +29,7 @@ const EVENTS: [AxisEvent; 22] = [
     E::ConnectionLoss,
 ];
 
-const SYMBOLS: [&str; 5] = ["BU", "SD", "IP", "SI", "flying start"];
+const SYMBOLS: [&str; 5] = ["BU", "SD", "IP", "SI", "flying"];
 
 fn conditions(bits: u8) -> AxisConditions {
     AxisConditions {
@@ -59,7 +59,7 @@ const NO_SI: Condition = |c| !c.start_inhibited;
 const SI: Condition = |c| c.start_inhibited;
 const IP: Condition = |c| c.in_process;
 const NO_IP: Condition = |c| !c.in_process;
-const FLYING: Condition = |c| c.flying_start;
+const NO_SD_FLYING: Condition = |c| !c.shutdown && c.flying_start;
 
 /// Table 5-2.97, row by row.
 const ACTIVE: &[Row] = &[
@@ -94,7 +94,8 @@ const ACTIVE: &[Row] = &[
     (Some(S::Stopping), &[E::StopComplete], NO_SD, S::Stopped),
     (Some(S::Stopping), &[E::StopComplete], SD, S::Shutdown),
     (Some(S::Stopping), &[E::MajorFault], ANY, S::Aborting),
-    (Some(S::Stopping), &[E::Enable], FLYING, S::Starting),
+    // Without SD by the text of clause 5-2.6.2.13.
+    (Some(S::Stopping), &[E::Enable], NO_SD_FLYING, S::Starting),
     (Some(S::Aborting), &[E::StopComplete], ANY, S::MajorFaulted),
     (Some(S::Aborting), &[E::FaultReset], ANY, S::Stopping),
     (Some(S::Testing), &[E::Shutdown], ANY, S::Stopping),

@@ -1,6 +1,7 @@
 //! Axis Control requests on a living device: completion criteria and errors of Tables 5-2.103 and 5-2.104.
 
 use super::*;
+use crate::device::axis::SequenceSettings;
 use crate::device::axis::drive_link::{DriveAction, DriveConditions, Withheld};
 use crate::device::axis::fault_log::LogKind;
 use crate::device::axis::state::AxisState;
@@ -489,4 +490,49 @@ fn the_position_rolls_over_as_a_dint() {
     rig.cycle();
     let position = rig.actual(0).actual.position;
     assert_eq!(position, Some(crate::wire::motion::ActualPosition::Dint(i32::MIN + 4)));
+}
+
+/// A reset that the controller cancels goes on (Table 5-2.108). What it asks for meanwhile is newer, and stands (clause 5-2.6.2.13).
+#[test]
+fn a_shutdown_or_an_abort_outlives_a_reset_that_was_under_way() {
+    for reset in [AxisControl::FAULT_RESET, AxisControl::SHUTDOWN_RESET] {
+        for (request, end, faults) in [
+            (AxisControl::SHUTDOWN, AxisState::Shutdown, 0),
+            (AxisControl::ABORT, AxisState::MajorFaulted, 1 << 54 | 1 << 62),
+        ] {
+            let mut rig = Rig::running();
+            rig.raise(0, 54, 0x22);
+            rig.cycles(4);
+            rig.drives[0].resetting = true;
+            assert_eq!(ask(&mut rig, reset, 2), (AxisControl::NONE, 0));
+            rig.blocks[0].axis_control = AxisControl::CANCEL;
+            rig.cycle();
+            assert_eq!(answer(&rig), (AxisControl::CANCEL, 0));
+            assert_eq!(ask(&mut rig, request, 2), (request, 0), "there is no torque to wait for");
+            assert_eq!(rig.state(0), AxisState::MajorFaulted);
+            rig.drives[0].resetting = false;
+            rig.cycles(4);
+            assert_eq!((rig.state(0), rig.device.axis_faults(0)), (end, Some(faults)), "{reset}, {request}");
+            assert_eq!(ask(&mut rig, AxisControl::SHUTDOWN_RESET, 4), (AxisControl::SHUTDOWN_RESET, 0));
+            assert_eq!((rig.state(0), rig.device.axis_faults(0)), (AxisState::Stopped, Some(0)));
+        }
+    }
+}
+
+#[test]
+fn a_stop_that_ends_in_shutdown_is_no_place_for_a_flying_start() {
+    for (stop, answer, state, end) in [
+        (AxisControl::DISABLE, (AxisControl::NONE, 0), AxisState::Starting, AxisState::Running),
+        (AxisControl::SHUTDOWN, (AxisControl::ENABLE, 0x0C), AxisState::Stopping, AxisState::Shutdown),
+    ] {
+        let mut rig = Rig::running();
+        rig.device.set_sequence(0, SequenceSettings { flying_start: true, abort: 0x22 });
+        rig.drives[0].stuck = true;
+        ask(&mut rig, stop, 2);
+        assert_eq!(rig.state(0), AxisState::Stopping);
+        assert_eq!((ask(&mut rig, AxisControl::ENABLE, 2), rig.state(0)), (answer, state), "{stop}");
+        rig.drives[0].stuck = false;
+        rig.cycles(4);
+        assert_eq!(rig.state(0), end, "{stop}");
+    }
 }
