@@ -122,7 +122,8 @@ impl Axis {
             AxisControl::SHUTDOWN_RESET if self.machine.state == AxisState::Shutdown => {
                 self.machine.shutdown = false;
                 self.fire(AxisEvent::ShutdownReset);
-                self.faults.record_cleared(ClearingEvent::SHUTDOWN_RESET, context.system_time);
+                // Minor faults may be latched.
+                self.faults.clear(ClearingEvent::SHUTDOWN_RESET, context.system_time);
                 Ok(true)
             }
             AxisControl::SHUTDOWN_RESET if self.machine.state != AxisState::MajorFaulted => Ok(true),
@@ -136,9 +137,9 @@ impl Axis {
                 Ok(false)
             }
             AxisControl::ABORT => {
-                let stop = self.sequence_settings.abort;
                 // A reset that still waits for the drive is older than the fault of this request.
                 self.orders.reset = None;
+                let stop = self.sequence_settings.abort;
                 self.faults.find(fault_code::CONTROLLER_INITIATED, 0, stop, context.system_time);
                 Ok(false)
             }

@@ -425,3 +425,23 @@ fn start_inhibits_come_and_go_as_alarm_records() {
     rig.drives[0].image.start_inhibits = 0;
     assert_eq!(records(&mut rig, 4), ["Start Inhibit 5 sub 0 state 0"]);
 }
+
+#[test]
+fn a_shutdown_reset_in_shutdown_clears_minor_faults_and_the_next_one_is_reported() {
+    const CAME: &str = "Axis Fault 54 sub 7 action 0x00";
+    let mut rig = listening();
+    set_actions(&mut rig, 2);
+    raise(&mut rig, &[condition(FaultType::AXIS, 54)]);
+    assert_eq!(records(&mut rig, 4), [CAME]);
+    raise(&mut rig, &[]);
+    rig.request_all(AxisControl::SHUTDOWN);
+    rig.cycles(5);
+    assert_eq!((rig.state(0), rig.device.axis_faults(0)), (AxisState::Shutdown, Some(1 << 54)));
+    rig.request_all(AxisControl::SHUTDOWN_RESET);
+    assert_eq!(records(&mut rig, 4).len(), 1, "cleared");
+    assert_eq!((rig.state(0), rig.device.axis_faults(0)), (AxisState::Stopped, Some(0)));
+    let entry = rig.device.fault_log(0).and_then(|log| log.entries().next().copied()).expect("an entry");
+    assert_eq!(entry.ended.map(|(by, _)| by), Some(ClearingEvent::SHUTDOWN_RESET));
+    raise(&mut rig, &[condition(FaultType::AXIS, 54)]);
+    assert_eq!(records(&mut rig, 4), [CAME]);
+}
