@@ -11,7 +11,8 @@ use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::motion::codes::{AxisControl, AxisStateCode, ControlMode};
 use profile_cip::wire::motion::{ActualFrame, CommandFrame, CommandInstance};
 use profile_generic::fault::FaultCause;
-use profile_generic::state::Report;
+use profile_generic::sequence::SequenceStep;
+use profile_generic::state::{DriveState, Report};
 use profile_generic::time::DurationNs;
 
 const TURNTABLE: AxisSet = AxisSet::one(1);
@@ -22,6 +23,7 @@ mod id {
     pub const RAMP_DECELERATION: u16 = 377;
     pub const FLYING_START_ENABLE: u16 = 380;
     pub const DECELERATION_LIMIT: u16 = 486;
+    pub const ZERO_SPEED_TIME: u16 = 609;
     pub const STOPPING_ACTION: u16 = 610;
     pub const STOPPING_TIME_LIMIT: u16 = 612;
     pub const BRAKE_RELEASE_DELAY: u16 = 615;
@@ -395,6 +397,81 @@ fn a_flying_start_goes_on_from_the_speed_that_there_is() {
             rig.step();
         }
         assert_eq!(state(&rig), AxisState::Running);
+    }
+}
+
+/// The mains are switched off while the axis coasts, and the controller enables it again: a flying start that cannot begin. It does not
+/// begin by itself when somebody switches the mains on again.
+#[test]
+fn an_enable_that_waits_for_main_power_becomes_a_fault_and_power_starts_nothing() {
+    let mut first = attributes(0, false);
+    if let Step::SetAttributes { attributes, .. } = &mut first {
+        attributes.push(AttributeSet::usint(id::FLYING_START_ENABLE, 1));
+        // It does not count as stopped before the supply has gone.
+        attributes.push(AttributeSet::real(id::ZERO_SPEED_TIME, 2.0));
+    }
+    let mut rig = Rig::ready(Settings::default());
+    let jog = Step::Jog { axis: 1, velocity: 2.0, acceleration: 50.0, jerk: 1_000.0, seconds: 100.0 };
+    let mut config = rig.controller_config();
+    config.axes[0].control_mode = ControlMode::VELOCITY;
+    rig.connect_with(config, vec![first, Step::Enable(TURNTABLE), jog]);
+    rig.run_until(millis(10_000), "the speed", |rig| rig.velocity(0) > 199 * NANO / 100);
+    request(&mut rig, AxisControl::DISABLE);
+    rig.run_for(millis(100));
+    rig.drive_mut(0).set_main_power(false);
+    rig.run_until(millis(500), "the end of the supply", |rig| {
+        rig.engine.axes()[0].state() == DriveState::AwaitingPower
+    });
+    assert_eq!(
+        (state(&rig), rig.engine.axes()[0].sequence_step()),
+        (AxisState::Stopping, SequenceStep::Coasting)
+    );
+    request(&mut rig, AxisControl::ENABLE);
+    rig.run_until(millis(20), "Starting", |rig| state(rig) == AxisState::Starting);
+    let waited = rig.run_until(millis(10_000), "the refusal", |rig| {
+        rig.told().contains("axis 1: the request Enable (1) was refused with status 0x0c")
+    });
+    assert!((millis(1_900)..millis(2_100)).contains(&waited), "{waited}");
+    assert_eq!(rig.engine.axes()[0].fault().map(|fault| fault.cause), Some(FaultCause::START_TIME_OUT));
+    rig.run_for(millis(8_000));
+    let changes = rig.watched[0].changes.len();
+    rig.drive_mut(0).set_main_power(true);
+    rig.run_for(millis(3_000));
+    assert_eq!((state(&rig), rig.watched[0].changes.len()), (AxisState::MajorFaulted, changes));
+    assert!(rig.torque_free());
+    request(&mut rig, AxisControl::FAULT_RESET);
+    rig.run_until(millis(1_000), "Stopped", |rig| state(rig) == AxisState::Stopped);
+    rig.run_for(millis(3_000));
+    assert_eq!((state(&rig), rig.torque_free()), (AxisState::Stopped, true));
+}
+
+/// The drive takes half a second to reset its fault. A controller that cancels the reset and shuts the axis down finds it shut down, and
+/// can reset that.
+#[test]
+fn a_shutdown_during_a_reset_that_takes_time_stays_until_its_own_reset() {
+    for (reset, shut_down_before) in [
+        (AxisControl::FAULT_RESET, false),
+        (AxisControl::SHUTDOWN_RESET, false),
+        (AxisControl::SHUTDOWN_RESET, true),
+    ] {
+        let mut rig = running(Settings::default(), false, attributes(2, false));
+        request(&mut rig, AxisControl::NONE);
+        rig.drive_mut(0).raise_fault(FaultCause::OVER_CURRENT);
+        rig.run_until(millis(1_000), "Major Faulted", |rig| state(rig) == AxisState::MajorFaulted);
+        rig.run_for(millis(500));
+        let before = if shut_down_before { AxisControl::SHUTDOWN } else { AxisControl::NONE };
+        for asked in [before, AxisControl::NONE, reset, AxisControl::CANCEL, AxisControl::SHUTDOWN] {
+            request(&mut rig, asked);
+            rig.run_for(millis(100));
+            assert_eq!(state(&rig), AxisState::MajorFaulted, "{asked}");
+        }
+        rig.run_for(millis(200));
+        rig.drive_mut(0).recover(FaultCause::OVER_CURRENT);
+        rig.run_until(millis(1_000), "Shutdown", |rig| state(rig) == AxisState::Shutdown);
+        rig.run_for(millis(6_000));
+        assert_eq!((state(&rig), shown(&rig).2), (AxisState::Shutdown, false), "{reset}");
+        request(&mut rig, AxisControl::SHUTDOWN_RESET);
+        rig.run_until(millis(1_000), "Stopped", |rig| state(rig) == AxisState::Stopped);
     }
 }
 

@@ -500,7 +500,7 @@ impl AxisChannel {
         }
         let transition = self.drive.machine.request(request);
         if is_start && transition.action == Action::Reject {
-            self.orders.reject_enable();
+            self.orders.reject_enable(now);
         }
         self.follow(now, system, transition);
     }

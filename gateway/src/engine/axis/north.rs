@@ -116,9 +116,13 @@ impl AxisChannel {
         self.carry_out_wish(now, system);
     }
 
-    /// Tries an enable again that was rejected because the drive was not ready. Call it in every cycle.
+    /// Tries an enable again that was rejected because the drive was not ready. One that has waited for
+    /// [`READY_TIME_OUT`](super::READY_TIME_OUT) becomes a fault: an axis does not start by itself when power returns later. Call it in every
+    /// cycle.
     pub fn retry_wish(&mut self, now: MonotonicTime, system: SystemTime) {
-        if self.state() == DriveState::Ready && self.orders.take_pending() {
+        if self.orders.is_pending_late(now, self.state() == DriveState::Stopping) {
+            self.raise(now, system, Fault::new(FaultCause::START_TIME_OUT, system));
+        } else if self.state() == DriveState::Ready && self.orders.take_pending() {
             self.carry_out_wish(now, system);
         }
     }

@@ -3,7 +3,7 @@
 use profile_generic::state::Request;
 use profile_generic::time::MonotonicTime;
 
-use super::RESET_TIME_OUT;
+use super::{READY_TIME_OUT, RESET_TIME_OUT};
 
 /// What a north side wants the axis to be: it holds until the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -69,10 +69,15 @@ struct Reset {
 #[derive(Debug, Default)]
 pub(super) struct Orders {
     wish: Wish,
+<<<<<<< HEAD
     /// An enable was rejected and is still asked for.
     enable_pending: bool,
     /// The wish is an axis without torque, and the reaction to a fault would hold it.
     pub hold_unwanted: bool,
+=======
+    /// Since when an enable that was rejected is still asked for.
+    enable_pending: Option<MonotonicTime>,
+>>>>>>> f1ebcd1e (Limit how long an Enable waits for its drive)
     /// The reset that was carried out last.
     reset_id: u32,
     reset: Option<Reset>,
@@ -111,24 +116,39 @@ impl Orders {
     /// Takes another wish.
     pub fn want(&mut self, wish: Wish) {
         self.wish = wish;
+<<<<<<< HEAD
         self.enable_pending = false;
         self.hold_unwanted = false;
+=======
+        self.enable_pending = None;
+>>>>>>> f1ebcd1e (Limit how long an Enable waits for its drive)
     }
 
     /// The request of an enable or a test was rejected: one that came in the very cycle in which the drive was not ready is still
     /// asked for.
-    pub fn reject_enable(&mut self) {
-        self.enable_pending = matches!(self.wish.intent, Intent::Enable | Intent::Test);
+    pub fn reject_enable(&mut self, now: MonotonicTime) {
+        let is_asked_for = matches!(self.wish.intent, Intent::Enable | Intent::Test);
+        self.enable_pending = is_asked_for.then_some(now);
     }
 
     /// Such an enable is not tried again: what has happened since needs a new order.
     pub fn forget_pending(&mut self) {
-        self.enable_pending = false;
+        self.enable_pending = None;
     }
 
     /// Whether such an enable is to be tried again, now that the drive is ready.
     pub fn take_pending(&mut self) -> bool {
-        std::mem::take(&mut self.enable_pending)
+        self.enable_pending.take().is_some()
+    }
+
+    /// Whether such an enable has waited for too long. A stop has time limits of its own: as long as the axis `stops`, the wait does not
+    /// begin.
+    pub fn is_pending_late(&mut self, now: MonotonicTime, stops: bool) -> bool {
+        let Some(since) = &mut self.enable_pending else { return false };
+        if stops {
+            *since = now;
+        }
+        now.since(*since) > READY_TIME_OUT
     }
 
     /// Whether the request of this number is another one than the last.
@@ -222,16 +242,32 @@ mod tests {
         {
             let mut orders = Orders::default();
             orders.want(Wish { intent, request: None });
-            orders.reject_enable();
+            orders.reject_enable(NOW);
             assert_eq!((orders.take_pending(), orders.take_pending()), (again, false), "{intent:?}");
-            orders.reject_enable();
+            orders.reject_enable(NOW);
             orders.want(Wish::default());
             assert!(!orders.take_pending(), "{intent:?}");
             orders.want(Wish { intent, request: None });
-            orders.reject_enable();
+            orders.reject_enable(NOW);
             orders.forget_pending();
             assert!(!orders.take_pending(), "{intent:?}");
         }
+    }
+
+    #[test]
+    fn rejected_enable_waits_for_a_limited_time_that_begins_after_a_stop() {
+        let mut orders = Orders::default();
+        let late = READY_TIME_OUT + DurationNs(1);
+        assert!(!orders.is_pending_late(NOW + late, false), "nothing is asked for");
+        orders.want(Wish { intent: Intent::Enable, request: None });
+        orders.reject_enable(NOW);
+        assert!(!orders.is_pending_late(NOW + READY_TIME_OUT, false));
+        assert!(orders.is_pending_late(NOW + late, false));
+        let stopped = NOW + late * 5;
+        assert!(!orders.is_pending_late(stopped, true), "the stop has its own limit");
+        assert!(!orders.is_pending_late(stopped + READY_TIME_OUT, false));
+        assert!(orders.is_pending_late(stopped + late, false));
+        assert!(orders.take_pending() && !orders.is_pending_late(stopped + late, false));
     }
 
     #[test]
