@@ -315,6 +315,8 @@ pub struct DriveProgram {
     pub(super) status: ArrayVec<StatusRow, MAX_STATUS_ROWS>,
     pub(super) status_words: ArrayVec<Place, STATUS_WORDS_MAX>,
     pub(super) known_status: StatusBits,
+    /// A bit of its own shows whether its power stage is supplied, also while it is faulted or disabled.
+    pub(super) has_power_bit: bool,
     pub(super) faults: ArrayVec<FaultRow, MAX_FAULT_ROWS>,
     pub(super) diagnosis: ArrayVec<Item, 2>,
     pub(super) commands: ArrayVec<(Action, Item), { Action::ALL.len() }>,
@@ -370,6 +372,7 @@ impl DriveProgram {
             status: ArrayVec::new(),
             status_words: ArrayVec::new(),
             known_status: StatusBits::empty(),
+            has_power_bit: false,
             faults: ArrayVec::new(),
             diagnosis: ArrayVec::new(),
             commands: ArrayVec::new(),
@@ -895,6 +898,12 @@ impl DriveProgram {
     /// Whether the drive tells this status bit.
     pub fn knows_status(&self, bit: StatusBits) -> bool {
         self.known_status.contains(bit)
+    }
+
+    /// Whether the drive shows by a bit of its own whether its power stage is supplied. Others show it by their states: faulted or disabled
+    /// they show nothing of it.
+    pub fn has_power_bit(&self) -> bool {
+        self.has_power_bit
     }
 
     /// The faults and warnings that a diagnostic word shows, in the order of the rows. A bit counts for one row only.

@@ -598,6 +598,7 @@ impl Cia402Tables {
             }
         }
         let tells = self.tells(axis);
+        program.has_power_bit = tells.voltage;
         for rule in self.reports.iter().filter(|rule| rule.drives.include(tells)) {
             for pattern in in_modes(rule.pattern, &rule.modes, chosen) {
                 // A drive that carries out something by itself need not follow command values.

@@ -2,6 +2,7 @@
 
 mod assembly;
 mod attributes;
+mod axis_status;
 mod bench_controller;
 mod beside;
 mod can;

@@ -10,7 +10,7 @@ use profile_cip::device::drive_link::{
     AbortCause, AbortOrder, AxisCommandImage, Command, DriveAction, DriveImage, HookupTest, SetPoints,
     TestOrder, TestReport, Withheld,
 };
-use profile_cip::wire::motion::codes::TestStatus;
+use profile_cip::wire::motion::codes::{AxisStatus, TestStatus};
 use profile_cip::wire::motion::test_service::{HookupTestData, hookup_status};
 use profile_generic::fault::{Fault, FaultCause};
 use profile_generic::hookup;
@@ -22,7 +22,7 @@ use profile_generic::state::DriveState;
 use profile_generic::time::{MonotonicTime, SystemTime};
 
 use crate::engine::axis::{AxisChannel, Intent, Loss, NorthPoints, Target, Wish};
-use crate::mapping::{CipFault, CipProgram, CipTrackers, Told};
+use crate::mapping::{CipFault, CipProgram, CipTrackers, DriveProgram, Told};
 
 /// What CIP Motion keeps of an axis from cycle to cycle.
 #[derive(Debug)]
@@ -36,6 +36,8 @@ pub struct CipAxis {
     /// The Control Modes that the drive has, by their numbers, for this number of its programs.
     control_modes: Option<(u64, Option<u16>)>,
     action_id: u32,
+    /// Whether the DC bus was charged when the drive showed it last.
+    bus_up: bool,
     /// How the device wants the axis stopped for a fault.
     abort: Option<AbortOrder>,
 }
@@ -51,6 +53,7 @@ impl CipAxis {
             reported: Told::default(),
             control_modes: None,
             action_id: 0,
+            bus_up: false,
             abort: None,
         }
     }
@@ -203,6 +206,8 @@ impl CipAxis {
         image.stop_complete = match step {
             SequenceStep::Holding => true,
             // A fault that ends in a hold has stopped the axis as well: the state is Major Faulted whatever becomes of the
+        self.bus_up = self.is_bus_up(axis, image);
+        image.axis_status.set(AxisStatus::DC_BUS_UP, self.bus_up);
             // torque (CIP Volume 9, 5-2.3.16.1.1).
             SequenceStep::Off => image.stop_complete || axis.holds(),
             // Nobody will see its end; the drive is heard again before the axis can be switched on.
@@ -223,6 +228,19 @@ impl CipAxis {
         if let Some((known, modes)) = self.control_modes
             && known == programs
         {
+    /// Whether the DC bus is charged. A drive that has no bit for it shows nothing of it while it is faulted or shut down: what it showed
+    /// last counts.
+    fn is_bus_up(&self, axis: &AxisChannel, image: &DriveImage) -> bool {
+        let shows = image.axis_status.contains(AxisStatus::DC_BUS_UP);
+        match axis.state() {
+            DriveState::Faulted | DriveState::Shutdown => {
+                let has_bit = axis.south().is_some_and(DriveProgram::has_power_bit);
+                shows || !has_bit && self.bus_up
+            }
+            _ => image.bus_up,
+        }
+    }
+
             return modes;
         }
         let modes = axis.south().map(|south| {

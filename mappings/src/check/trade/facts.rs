@@ -624,8 +624,6 @@ pub(super) const AXIS_STATUS: &[(&str, &str, Option<&str>)] = &[
     ("Acceleration Limit", "acceleration_limit", None),
     ("Torque Limit", "torque_limit", None),
     ("Current Limit", "current_limit", None),
-    ("Feedback Integrity", "ready", None),
-    ("Feedback Integrity", "enabled", None),
     ("Shutdown", "shutdown", None),
     ("Position Control Mode", "enabled", Some("position")),
     ("Velocity Control Mode", "enabled", Some("velocity")),

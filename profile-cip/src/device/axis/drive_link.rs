@@ -260,7 +260,8 @@ pub struct DriveImage {
     pub velocity: Option<f32>,
     /// Actual acceleration, acceleration control units; `None` when the drive does not report it.
     pub acceleration: Option<f32>,
-    /// Bits of Axis Status that only the drive knows; those that the state machine owns are replaced.
+    /// Bits of Axis Status that only the drive knows; those that the state machine owns are replaced. DC Bus Up counts while the axis is
+    /// faulted or shut down.
     pub axis_status: AxisStatus,
     /// Axis Status - Mfg: bits of the vendor.
     pub axis_status_mfg: u32,

@@ -22,6 +22,10 @@ const ALARM_WORDS: usize = 4;
 /// Place of the axis alarms among the alarm words.
 const AXIS_ALARMS: usize = 2;
 
+/// Exceptions that put the position in doubt, bits 41 to 47 of Table 5-2.65: noise, loss of the signal, loss of data, failure of the
+/// feedback device.
+const OF_FEEDBACK: u64 = 0x7F << 41;
+
 /// The words of bits of an axis, for its attributes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FaultWords {
@@ -215,6 +219,18 @@ impl Faults {
     /// Whether an exception is an alarm now (Axis Status bit 1; start inhibits do not count).
     pub fn any_axis_alarm(&self) -> bool {
         self.words.alarms[AXIS_ALARMS..].iter().any(|word| *word != 0)
+    }
+
+    /// Whether something puts the position in doubt or has done so since the last reset: an exception of the feedback, or a lost
+    /// absolute position.
+    pub fn any_of_feedback(&self, image: &DriveImage) -> bool {
+        let word = |fault_type| self.words.fault(fault_type);
+        let of_axis = self.words.exceptions[0] | word(FaultType::AXIS);
+        let of_position =
+            |condition: &DriveCondition| matches!(condition.fault_type, FaultType::APR | FaultType::APR_MFG);
+        of_axis & OF_FEEDBACK != 0
+            || word(FaultType::APR) | word(FaultType::APR_MFG) != 0
+            || image.conditions.as_slice().iter().any(of_position)
     }
 
     /// The record of attributes 661 to 663, 666 and 668.

@@ -74,9 +74,12 @@ pub(super) fn status(axis: &Axis, context: &Context) -> AxisStatus {
     let mut status = axis.drive.axis_status;
     status.set(AxisStatus::LOCAL_CONTROL, !context.remote);
     status.set(AxisStatus::ALARM, axis.faults.any_axis_alarm());
-    status.set(AxisStatus::DC_BUS_UP, axis.drive.bus_up);
+    status.set(AxisStatus::DC_BUS_UP, is_bus_up(axis));
     status.set(AxisStatus::POWER_STRUCTURE_ENABLED, powered);
     status.set(AxisStatus::TRACKING_COMMAND, axis.answers() && axis.drive.tracking);
+    let has_feedback = axis.config.kind != ControlKind::Converter;
+    let doubted = axis.faults.any_of_feedback(&axis.drive);
+    status.set(AxisStatus::FEEDBACK_INTEGRITY, has_feedback && !doubted);
     status.set(AxisStatus::SHUTDOWN, axis.machine.shutdown);
     status.set(AxisStatus::IN_PROCESS, axis.test.is_in_process());
     status.set(AxisStatus::POSITION_CONTROL_MODE, powered && mode == ControlMode::POSITION.0);
@@ -91,6 +94,14 @@ pub(super) fn status(axis: &Axis, context: &Context) -> AxisStatus {
             | AxisStatus::SHUTDOWN;
     }
     status & allowed(axis.machine.kind, axis.machine.state, powered)
+}
+
+/// Whether the DC bus is charged. The condition of the state machine says so, except that a fault or a shutdown of the drive ends it and
+/// leaves the bus as it is (Table 5-2.60).
+fn is_bus_up(axis: &Axis) -> bool {
+    let is_over =
+        matches!(axis.machine.state, AxisState::Aborting | AxisState::MajorFaulted | AxisState::Shutdown);
+    axis.drive.bus_up || is_over && axis.drive.axis_status.contains(AxisStatus::DC_BUS_UP)
 }
 
 /// The cyclic actual block of D-to-C update `update_id`, whose time stamp is `stamp`, system time in ns; `None` for an

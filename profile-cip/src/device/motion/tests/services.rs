@@ -57,8 +57,8 @@ fn engine_attributes_are_read_as_they_are() {
     let values = values(&body);
     assert_eq!(values[0], (650, vec![4]));
     assert_eq!(values[1], (40, vec![1]));
-    // Bus up, power, tracking, position control.
-    assert_eq!(values[2], (651, 0x0040_002C_u32.to_le_bytes().to_vec()));
+    // Bus up, power, tracking, feedback integrity, position control.
+    assert_eq!(values[2], (651, 0x0042_002C_u32.to_le_bytes().to_vec()));
     assert_eq!(values[3], (99, vec![0xEE, 0x14]));
 }
 
