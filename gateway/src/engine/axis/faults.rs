@@ -119,8 +119,8 @@ impl Faults {
     }
 
     /// What the fault that has just come is about: why the command was lost.
-    pub fn note_loss(&mut self, loss: Loss) {
-        self.loss = Some(loss);
+    pub fn note_loss(&mut self, loss: Option<Loss>) {
+        self.loss = loss;
     }
 
     /// The same: the limit that a set-point has exceeded, when that is the fault of this instant.
@@ -237,7 +237,7 @@ mod tests {
         faults.reset(false);
         assert_eq!(faults.tripped(), None);
         faults.stop_for(fault(FaultCause::COMMAND_LOST, 5));
-        faults.note_loss(Loss::End);
+        faults.note_loss(Some(Loss::End));
         assert_eq!((faults.loss(), faults.tripped()), (Some(Loss::End), None));
     }
 

@@ -203,7 +203,7 @@ impl AxisChannel {
     pub fn lose_command(&mut self, now: MonotonicTime, system: SystemTime, loss: Loss) {
         let command_loss = self.faults.command_loss;
         if self.fault().is_none() && self.state().is_running() {
-            self.faults.note_loss(loss);
+            self.note_loss(Some(loss));
             let fault = Fault::new(FaultCause::COMMAND_LOST, system).with_reaction(command_loss);
             self.raise(now, system, fault);
         } else if self.state() == DriveState::FaultReaction
@@ -214,6 +214,11 @@ impl AxisChannel {
             let transition = self.drive.machine.raise_fault(command_loss);
             self.follow(now, system, transition);
         }
+    }
+
+    /// Says why the command is lost, ahead of the fault that is about it.
+    pub fn note_loss(&mut self, loss: Option<Loss>) {
+        self.faults.note_loss(loss);
     }
 
     /// The north side is lost: the axis stops as configured for a lost command.

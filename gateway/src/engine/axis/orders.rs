@@ -69,15 +69,10 @@ struct Reset {
 #[derive(Debug, Default)]
 pub(super) struct Orders {
     wish: Wish,
-<<<<<<< HEAD
-    /// An enable was rejected and is still asked for.
-    enable_pending: bool,
-    /// The wish is an axis without torque, and the reaction to a fault would hold it.
-    pub hold_unwanted: bool,
-=======
     /// Since when an enable that was rejected is still asked for.
     enable_pending: Option<MonotonicTime>,
->>>>>>> f1ebcd1e (Limit how long an Enable waits for its drive)
+    /// The wish is an axis without torque, and the reaction to a fault would hold it.
+    pub hold_unwanted: bool,
     /// The reset that was carried out last.
     reset_id: u32,
     reset: Option<Reset>,
@@ -116,12 +111,8 @@ impl Orders {
     /// Takes another wish.
     pub fn want(&mut self, wish: Wish) {
         self.wish = wish;
-<<<<<<< HEAD
-        self.enable_pending = false;
-        self.hold_unwanted = false;
-=======
         self.enable_pending = None;
->>>>>>> f1ebcd1e (Limit how long an Enable waits for its drive)
+        self.hold_unwanted = false;
     }
 
     /// The request of an enable or a test was rejected: one that came in the very cycle in which the drive was not ready is still

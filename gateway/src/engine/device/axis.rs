@@ -96,14 +96,16 @@ impl CipAxis {
         target: Option<MonotonicTime>,
     ) {
         // Before the action: a lost command stops the axis as its configuration says, whatever the device asks for then.
-        if let Command::Withheld(why) = image.command
-            && let Some(why) = lost(why)
-        {
-            axis.lose_command(now, system, Loss::Withheld(why));
+        let loss = match image.command {
+            Command::Withheld(why) => lost(why),
+            Command::Follow(_) => None,
+        };
+        if let Some(loss) = loss {
+            axis.lose_command(now, system, loss);
         }
         axis.take_test(now, image.test.map(test_order));
         // Before the action: a stop that is ordered in a particular way is under way when the action asks for any.
-        self.take_abort(axis, (now, system), image.abort);
+        self.take_abort(axis, (now, system), image.abort, loss);
         if image.action_id != self.action_id {
             self.action_id = image.action_id;
             let request = self.program.drive_request(image.action);
@@ -117,12 +119,13 @@ impl CipAxis {
         }
     }
 
-    /// The motion device orders a stop for what it has found itself, or a harder one than before.
+    /// The motion device orders a stop for what it has found itself, or a harder one than before. `loss` is why the command is lost.
     fn take_abort(
         &mut self,
         axis: &mut AxisChannel,
         (now, system): (MonotonicTime, SystemTime),
         order: Option<AbortOrder>,
+        loss: Option<Loss>,
     ) {
         let new = order.filter(|order| self.abort.is_none_or(|known| known.action != order.action));
         self.abort = order;
@@ -133,7 +136,10 @@ impl CipAxis {
             AbortCause::DriveLost => FaultCause::SOUTH_SILENCE,
             // It has stopped for that already, as it is configured for a lost command, unless it was about to stop.
             AbortCause::Node if axis.state() == DriveState::FaultReaction => return,
-            AbortCause::Node => FaultCause::COMMAND_LOST,
+            AbortCause::Node => {
+                axis.note_loss(loss);
+                FaultCause::COMMAND_LOST
+            }
         };
         let fault = Fault::new(cause, system).with_reaction(self.program.reaction(order.action));
         axis.take_fault(now, system, fault);
@@ -200,14 +206,14 @@ impl CipAxis {
         // The controller is about to end it, or has a fault that says why it cannot be ended.
         feedback.inhibits.remove(Inhibits::CONFIGURATION_INCOMPLETE);
         self.program.drive_image(&feedback, axis.fault_set(), &mut self.reported, image);
+        self.bus_up = self.is_bus_up(axis, image);
+        image.axis_status.set(AxisStatus::DC_BUS_UP, self.bus_up);
         let step = axis.sequence_step();
         image.start_complete &= step == SequenceStep::Running;
         image.tracking &= step == SequenceStep::Running;
         image.stop_complete = match step {
             SequenceStep::Holding => true,
             // A fault that ends in a hold has stopped the axis as well: the state is Major Faulted whatever becomes of the
-        self.bus_up = self.is_bus_up(axis, image);
-        image.axis_status.set(AxisStatus::DC_BUS_UP, self.bus_up);
             // torque (CIP Volume 9, 5-2.3.16.1.1).
             SequenceStep::Off => image.stop_complete || axis.holds(),
             // Nobody will see its end; the drive is heard again before the axis can be switched on.
@@ -222,12 +228,6 @@ impl CipAxis {
         }
     }
 
-    /// The Control Modes whose operating mode the drive has, by their numbers.
-    fn control_modes(&mut self, axis: &AxisChannel) -> Option<u16> {
-        let programs = axis.programs();
-        if let Some((known, modes)) = self.control_modes
-            && known == programs
-        {
     /// Whether the DC bus is charged. A drive that has no bit for it shows nothing of it while it is faulted or shut down: what it showed
     /// last counts.
     fn is_bus_up(&self, axis: &AxisChannel, image: &DriveImage) -> bool {
@@ -241,6 +241,12 @@ impl CipAxis {
         }
     }
 
+    /// The Control Modes whose operating mode the drive has, by their numbers.
+    fn control_modes(&mut self, axis: &AxisChannel) -> Option<u16> {
+        let programs = axis.programs();
+        if let Some((known, modes)) = self.control_modes
+            && known == programs
+        {
             return modes;
         }
         let modes = axis.south().map(|south| {
@@ -251,10 +257,14 @@ impl CipAxis {
         modes
     }
 
-    /// The fault, where the controller knows it as one of the communications node: its code, and since when.
+    /// The fault, where the controller knows it as one of the communications node: its code, and since when. Commands that the node
+    /// withheld are no fault beside that of the node: it may be over already when the axis shows that it has stopped.
     #[must_use]
     pub fn node_fault(&self, axis: &AxisChannel) -> Option<(u8, SystemTime)> {
         let fault = axis.fault()?;
+        if axis.loss().is_some_and(|loss| BY_NODE.into_iter().any(|why| lost(why) == Some(loss))) {
+            return None;
+        }
         match self.program.fault(fault.cause) {
             Some(CipFault::Node(code)) => Some((code, fault.at)),
             _ => None,
@@ -262,12 +272,15 @@ impl CipAxis {
     }
 }
 
+/// Why the node withholds set-points. Its own fault says it.
+const BY_NODE: [Withheld; 2] = [Withheld::NodeFault, Withheld::ConnectionLost];
+
 /// Why set-points that are withheld are a lost command; `None` while the axis is not meant to have any.
-const fn lost(why: Withheld) -> Option<&'static str> {
+const fn lost(why: Withheld) -> Option<Loss> {
     match why {
-        Withheld::Stale => Some("Stale"),
-        Withheld::ConnectionLost => Some("ConnectionLost"),
-        Withheld::NodeFault => Some("NodeFault"),
+        Withheld::Stale => Some(Loss::Withheld("Stale")),
+        Withheld::ConnectionLost => Some(Loss::Withheld("ConnectionLost")),
+        Withheld::NodeFault => Some(Loss::Withheld("NodeFault")),
         Withheld::NotConnected | Withheld::NotRunning | Withheld::LocalControl | Withheld::NoSetPoint => None,
     }
 }
