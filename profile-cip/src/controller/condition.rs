@@ -70,8 +70,11 @@ impl ValueCheck {
         let found = Number::read(self.width, bytes);
         let good = match (found, self.value) {
             (Some(Number::Integer(found)), Number::Integer(wanted)) => {
-                let distance = found.abs_diff(wanted);
-                distance == 0 || super::number::float(distance.cast_signed().max(1)) <= self.tolerance
+                let distance = match self.width {
+                    Width::U64 => found.cast_unsigned().abs_diff(wanted.cast_unsigned()),
+                    _ => found.abs_diff(wanted),
+                };
+                distance == 0 || super::number::distance(distance) <= self.tolerance
             }
             (Some(Number::Float(found)), Number::Float(wanted)) => (found - wanted).abs() <= self.tolerance,
             _ => false,
@@ -394,6 +397,13 @@ mod tests {
                 .1
         };
         assert!(judge(5, 0.0, 5) && !judge(5, 0.0, 6) && judge(5, 1.0, 6) && !judge(5, 1.0, 3));
+        let far = |width, wanted: i64, found: i64| {
+            ValueCheck { width, value: Number::Integer(wanted), tolerance: 1.0 }.judge(&found.to_le_bytes()).1
+        };
+        let most = 5_000_000_000_000_000_000;
+        assert!(!far(Width::I64, -most, most) && !far(Width::I64, most, -most) && far(Width::I64, -1, 0));
+        // The bits of an unsigned value: the largest one is not near zero, and has no sign in the middle.
+        assert!(!far(Width::U64, 0, -1) && far(Width::U64, i64::MAX, i64::MIN) && far(Width::U64, -2, -1));
         let real = ValueCheck { width: Width::F32, value: Number::Float(1.0), tolerance: 0.5 };
         assert!(real.judge(&1.5_f32.to_le_bytes()).1 && !real.judge(&1.6_f32.to_le_bytes()).1);
         assert!(!real.judge(&f32::NAN.to_le_bytes()).1 && !real.judge(&[0]).1);

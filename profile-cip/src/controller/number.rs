@@ -8,6 +8,12 @@ pub(super) const fn float(counts: i64) -> f64 {
     counts as f64
 }
 
+/// A distance between counts as a floating point number; beyond 2^53 the nearest one.
+#[expect(clippy::cast_precision_loss, reason = "the nearest number is what is wanted")]
+pub(super) const fn distance(counts: u64) -> f64 {
+    counts as f64
+}
+
 /// A floating point value rounded to the nearest count, ties away from zero; beyond the range its end.
 #[expect(clippy::cast_possible_truncation, reason = "rounded before, and the cast saturates")]
 pub(super) fn counts(value: f64) -> i64 {
