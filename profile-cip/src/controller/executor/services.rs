@@ -34,6 +34,11 @@ pub(super) fn advance(step: &Step, run: &mut Run, cx: &mut Context<'_>) -> Resul
         Step::Explicit { message, status } => {
             if !run.done {
                 run.done = cx.session.message(cx.now, Asker::Program, message);
+                // The session judges what it has sent; without a session nothing is sent.
+                let waited = cx.now - run.since;
+                if !run.done && waited > run.time_out.unwrap_or(cx.config.time_outs.explicit) {
+                    return Err(Failure::StepTimeOut { waited });
+                }
                 return Ok(false);
             }
             let Some(answer) = cx.answer.take() else { return Ok(false) };

@@ -2,6 +2,7 @@
 
 use super::peer::Peer;
 use super::rig::{Rig, config};
+use crate::controller::program::ExplicitMessage;
 use crate::controller::{AttributeSet, AxisSet, Controller, ControllerConfig, Failure, Limits, Report, Step};
 use crate::wire::motion::codes::{AxisControl, AxisStateCode, NodeAlarm, NodeFault, SyncStatus};
 use crate::wire::status::ConnectionStatus;
@@ -227,6 +228,24 @@ fn a_stream_that_cannot_be_opened_again_is_tried_once_a_second_and_ends_no_move(
     assert!(seconds < 15, "it does not wait for ever to close in order: {seconds}");
     assert_eq!(rig.peer.axes[0].state, AxisStateCode::STOPPED, "disabled before the connection ends");
     assert!(!rig.peer.seen.contains(&"Forward_Close".to_owned()));
+}
+
+#[test]
+fn an_explicit_step_ends_by_its_time_while_there_is_no_session() {
+    let message = ExplicitMessage { service: 0x0E, class: 1, instance: 1, attribute: Some(1), data: vec![] };
+    let explicit = Step::Explicit { message, status: None };
+    let short = Step::Within { time_out: DurationNs::from_millis(200), step: Box::new(explicit.clone()) };
+    for (step, expected) in [(explicit, "not finished within 5"), (short, "not finished within 20")] {
+        let mut rig = Rig::new(config(1), Peer::new(&[0.0]), vec![Step::Dwell { seconds: 0.5 }, step]);
+        rig.refuse_streams = true;
+        rig.script = Box::new(|now, updates, _, controller| {
+            if updates == 100 {
+                controller.tcp_closed(now);
+            }
+        });
+        let report = rig.run(30);
+        assert!(text(&report).starts_with(expected), "{}", text(&report));
+    }
 }
 
 #[test]
