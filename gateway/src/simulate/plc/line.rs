@@ -7,9 +7,12 @@ use std::time::{Duration, Instant};
 use profile_cip::assembly::RUN;
 use profile_cip::wire::class1::{CLASS1_HEADER_LEN, Class1Datagram};
 
-use super::session::Ids;
+use super::session::{Ids, TIMEOUT_INTERVALS};
 use super::{Images, Plan, PlcError, socket};
 use crate::sys::udp::PORT_IO;
+
+/// The shortest wait for a datagram.
+const LEAST_WAIT: Duration = Duration::from_micros(1);
 
 /// What was counted on the connections.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -31,16 +34,22 @@ pub(super) struct Line {
     received: Option<u32>,
     /// The controller is in run.
     pub run: bool,
-    /// Input has come.
-    pub heard: bool,
+    /// When input came last.
+    heard: Option<Instant>,
 }
 
 impl Line {
     pub fn new(io: UdpSocket, ids: Ids) -> Self {
-        Self { io, ids, sent: 0, received: None, run: true, heard: false }
+        Self { io, ids, sent: 0, received: None, run: true, heard: None }
     }
 
-    /// One interval: sends the output and takes what comes.
+    /// Whether input has come within the time-out of the connection.
+    pub fn is_live(&self, plan: &Plan) -> bool {
+        self.heard.is_some_and(|heard| heard.elapsed() <= plan.interval * TIMEOUT_INTERVALS)
+    }
+
+    /// One interval: sends the output and takes what comes. Fails once the device was heard and is silent for longer than
+    /// the time-out of the connection.
     pub fn exchange(
         &mut self,
         plan: &Plan,
@@ -63,11 +72,14 @@ impl Line {
         self.io.send_to(&bytes, (plan.address, PORT_IO)).map_err(socket("cannot send"))?;
         counts.sent += 1;
         let came = self.listen(end, plan, images, counts)?;
-        counts.late += u64::from(self.heard && came == 0);
+        counts.late += u64::from(self.heard.is_some() && came == 0);
+        if self.heard.is_some() && !self.is_live(plan) {
+            return Err(PlcError::ConnectionLost { limit: plan.interval * TIMEOUT_INTERVALS });
+        }
         Ok(())
     }
 
-    /// Takes what comes until `end`; how many datagrams that were.
+    /// Takes what comes until `end`, and what has come before; how many datagrams that were.
     pub fn listen(
         &mut self,
         end: Instant,
@@ -77,12 +89,15 @@ impl Line {
     ) -> Result<u32, PlcError> {
         let mut buffer = vec![0; CLASS1_HEADER_LEN + images.input.len() + 1];
         let mut came = 0;
+        // What came while this process did not run is not lost: it is read at least once.
+        let mut is_read = false;
         loop {
             let left = end.saturating_duration_since(Instant::now());
-            if left < Duration::from_micros(1) {
+            if left < LEAST_WAIT && is_read {
                 return Ok(came);
             }
-            self.io.set_read_timeout(Some(left)).map_err(socket("cannot wait"))?;
+            is_read = true;
+            self.io.set_read_timeout(Some(left.max(LEAST_WAIT))).map_err(socket("cannot wait"))?;
             let (len, from) = match self.io.recv_from(&mut buffer) {
                 Ok(received) => received,
                 Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
@@ -103,7 +118,7 @@ impl Line {
                 counts.lost += u64::from(gap - 1);
                 self.received = Some(number);
                 images.input.copy_from_slice(datagram.data);
-                self.heard = true;
+                self.heard = Some(Instant::now());
                 came += 1;
             }
         }

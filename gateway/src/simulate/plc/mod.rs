@@ -146,6 +146,12 @@ pub enum PlcError {
         /// The time it had.
         limit: Duration,
     },
+    /// The device has been silent for longer than the time-out of the connection.
+    #[error("the connection is lost: the device sent nothing for {} s", limit.as_secs_f64())]
+    ConnectionLost {
+        /// The time-out.
+        limit: Duration,
+    },
     /// The step needs a connection.
     #[error("there is no connection")]
     Unconnected,
@@ -157,3 +163,6 @@ pub enum PlcError {
 fn socket(what: &'static str) -> impl Fn(io::Error) -> PlcError {
     move |source| PlcError::Socket { what, source }
 }
+
+#[cfg(test)]
+mod tests;

@@ -232,8 +232,9 @@ impl Player<'_> {
         Ok(())
     }
 
-    fn heard(&self) -> bool {
-        self.line.as_ref().is_some_and(|line| line.heard)
+    /// Whether the input is what the device sends now.
+    fn is_live(&self) -> bool {
+        self.line.as_ref().is_some_and(|line| line.is_live(self.plan))
     }
 
     /// Takes the torque away, whatever came before; nothing stops this but its time. Then closes.
@@ -282,7 +283,7 @@ impl Player<'_> {
             intervals += 1;
             let settled = intervals > GRACE_INTERVALS && begun.elapsed() > GRACE;
             let name = |axis: usize| self.plan.name(axis).to_owned();
-            if self.heard() {
+            if self.is_live() {
                 for &axis in wait.axes {
                     let status = self.images.status(axis);
                     if status.contains(Status::FAULT) && !wait.with_faults {
@@ -298,7 +299,7 @@ impl Player<'_> {
                 }
             }
             if begun.elapsed() >= wait.within {
-                let late = wait.axes.iter().find(|axis| !self.heard() || !done(&self.images, **axis));
+                let late = wait.axes.iter().find(|axis| !self.is_live() || !done(&self.images, **axis));
                 let name = name(late.copied().unwrap_or(0));
                 return Err(PlcError::Late { name, step: wait.step, limit: wait.within });
             }
@@ -435,11 +436,11 @@ impl Player<'_> {
         loop {
             self.interval()?;
             let (met, found) = meets(&self.images, axis, condition);
-            if self.heard() && met {
+            if self.is_live() && met {
                 return Ok(());
             }
             if begun.elapsed() >= within {
-                let found = if self.heard() { found } else { "said nothing".to_owned() };
+                let found = if self.is_live() { found } else { "said nothing".to_owned() };
                 let name = self.plan.name(axis).to_owned();
                 return Err(PlcError::Unmet { name, expected: condition.to_string(), found, limit: within });
             }

@@ -24,6 +24,10 @@ use super::{Plan, PlcError, socket};
 /// How long the device may take for an explicit answer.
 const ANSWER: Duration = Duration::from_secs(5);
 
+/// Time-out multiplier of the connection: the code of the Forward_Open, and the intervals of silence that it stands for.
+const TIMEOUT_MULTIPLIER: u8 = 2;
+pub(super) const TIMEOUT_INTERVALS: u32 = 4 << TIMEOUT_MULTIPLIER;
+
 /// The connection IDs of an open connection, O->T and T->O, and its triad.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ids {
@@ -135,7 +139,7 @@ impl Session {
             o_to_t_id: 0,
             t_to_o_id: serial.wrapping_add(u32::from(self.opened)),
             triad,
-            timeout_multiplier: 2,
+            timeout_multiplier: TIMEOUT_MULTIPLIER,
             o_to_t_rpi_us: interval,
             o_to_t: direction(o_to_t),
             t_to_o_rpi_us: interval,
