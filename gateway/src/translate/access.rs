@@ -21,7 +21,8 @@ impl Translator {
             )));
         };
         let mut node =
-            Node::new(text!("axis {}: set attribute {id} {} to {}", axis.name, known.name, hex(bytes)));
+            Node::new(text!("axis {}: set attribute {id} {} to {}", axis.name, known.name, hex(bytes)))
+                .about(number);
         if let Some((_, reason)) = mapping.cip.rejected.iter().find(|(rejected, _)| *rejected == id) {
             node.push(Node::new(text!("not supported: {reason}")));
         }
@@ -86,7 +87,8 @@ impl Translator {
     pub(super) fn held(&mut self, number: usize, item: Item, bytes: &[u8]) -> Result<Node, TranslateError> {
         let stage = Arc::clone(&self.stage);
         let (axis, mapping) = (&stage.axes[number], &stage.mapping);
-        let mut node = Node::new(text!("{}: {} is {}", axis.drive, self.named(item), hex(bytes)));
+        let mut node =
+            Node::new(text!("{}: {} is {}", axis.drive, self.named(item), hex(bytes))).about(number);
         if axis.south.is_diagnostic(item) {
             self.causes(number, item, bytes, &mut node)?;
             return Ok(node);
@@ -169,18 +171,19 @@ impl Translator {
             found.extend(faults.filter(drive).map(|active| active.fault));
             bench.recover(number, before);
         }
+        let reports = |cause| Fact {
+            axis: number,
+            direction: Direction::FromDrive,
+            recorded: true,
+            what: What::Fault(cause),
+            raw: Some(Raw::new(bytes, Some(word.into()), Some(0), Carrier::Object)),
+        };
         for fault in &found {
             let (cause, reaction) = (fault.cause, fault.reaction);
             let has_row = axis.south.faults(item, word).any(|(known, _)| known == cause);
             let row = has_row.then(|| axis.fault_row(mapping, item, word, cause)).flatten();
-            let fact = Fact {
-                axis: number,
-                direction: Direction::FromDrive,
-                recorded: true,
-                what: What::Fault(cause),
-                raw: Some(Raw::new(bytes, Some(word.into()), Some(0), Carrier::Object)),
-            };
-            let mut shown = Node::new(text!("{cause}, reaction {reaction}")).by(row).shows([fact]);
+            let mut shown =
+                Node::new(text!("{cause}, reaction {reaction}")).by(row).shows([reports(Some(cause))]);
             let seen = match axis.north.fault(cause) {
                 Some(CipFault::Axis { fault_type, alarm_type, code }) => {
                     let alarm =
@@ -194,7 +197,7 @@ impl Translator {
             node.push(shown);
         }
         if found.is_empty() {
-            node.push(Node::new("nothing is wrong"));
+            node.push(Node::new("nothing is wrong").shows([reports(None)]));
         }
         Ok(())
     }

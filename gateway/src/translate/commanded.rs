@@ -118,6 +118,7 @@ impl Translator {
             && state == DriveState::Operating
             && fault.is_none();
         let answer = self.block_of(number);
+        node.facts.extend(self.fault_ended(number));
         for ((text, signal), (_, raw)) in elements(&block.values).into_iter().zip(of_command(block)) {
             let value = told.command.get(signal).filter(|_| follows);
             let element = match value {
@@ -151,9 +152,6 @@ impl Translator {
     fn request(&self, number: usize, block: &CommandBlock, answer: Option<&ActualBlock>, node: &mut Node) {
         let axis = &self.stage.axes[number];
         let code = block.axis_control;
-        if code == AxisControl::NONE {
-            return;
-        }
         let raw = Raw::new(&[code.0], Some(code.0.into()), Some(AXIS_CONTROL_AT), Carrier::Block);
         let fact = Fact {
             axis: number,
@@ -162,6 +160,10 @@ impl Translator {
             what: What::Request(code),
             raw: Some(raw),
         };
+        if code == AxisControl::NONE {
+            node.facts.push(fact);
+            return;
+        }
         let row = self.stage.mapping.request_row(code.0);
         let mut request = match axis.north.request(code.0) {
             None => Node::new(text!("Axis Control {code}: no row")),
@@ -289,7 +291,7 @@ pub(super) fn push_notices(node: &mut Node, said: &[Notice], number: usize, axis
                 axis: number,
                 direction: Direction::ToController,
                 recorded: false,
-                what: What::Fault(fault.cause),
+                what: What::Fault(Some(fault.cause)),
                 raw: None,
             }),
             _ => None,

@@ -64,14 +64,14 @@ pub enum What {
     State(DriveState),
     /// The same for the controller.
     AxisState(AxisStateCode),
-    /// A request of the controller.
+    /// A request of the controller; also that there is none.
     Request(AxisControl),
-    /// What a drive reports beside its state.
+    /// What a drive reports beside its state; empty if it reports nothing.
     Status(StatusBits),
     /// A control word that was recorded.
     ControlWord(u16),
-    /// A fault that was raised.
-    Fault(FaultCause),
+    /// A fault that was raised; none at the end of one.
+    Fault(Option<FaultCause>),
 }
 
 /// The bytes of a value.

@@ -5,6 +5,9 @@ use std::collections::HashMap;
 use super::fact::{Direction, What};
 use super::{Entry, Mark, Node};
 
+/// Lines that are compared at once. When there are more, those that come again count as changed once.
+const LINES_MAX: usize = 4096;
+
 /// What to show. Every frame is translated, also those that are not shown: what follows depends on them.
 #[derive(Debug, Default)]
 pub struct Filter {
@@ -18,13 +21,26 @@ pub struct Filter {
     pub changes: bool,
     /// What each value was last.
     last: HashMap<(usize, Direction, bool, &'static str), What>,
+    /// What each line without a value said last, by its axis, and the names of the line above and its own.
+    lines: HashMap<(usize, String), String>,
+}
+
+/// What counts of the line above for those below it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Above<'a> {
+    /// The axis that it is about.
+    axis: Option<usize>,
+    /// Its name; `None` above the heading of a frame.
+    name: Option<&'a str>,
+    /// It shows a value that has changed: what is said of that value goes with it.
+    has_new_value: bool,
 }
 
 impl Filter {
     /// A filter that has seen nothing yet.
     #[must_use]
     pub fn new(first: u64, only: Vec<Direction>, axis: Option<usize>, changes: bool) -> Self {
-        Self { first, only, axis, changes, last: HashMap::new() }
+        Self { first, only, axis, changes, last: HashMap::new(), lines: HashMap::new() }
     }
 
     /// What of a frame is shown; `None` if nothing is.
@@ -37,7 +53,7 @@ impl Filter {
                     return None;
                 }
             }
-            if self.changes && !self.prune_unchanged(tree) {
+            if self.changes && !self.prune_unchanged(tree, Above::default()) {
                 return None;
             }
         }
@@ -49,7 +65,9 @@ impl Filter {
     }
 
     /// Takes out what has not changed; whether something is left.
-    fn prune_unchanged(&mut self, node: &mut Node) -> bool {
+    fn prune_unchanged(&mut self, node: &mut Node, above: Above<'_>) -> bool {
+        let axis = node.axis.or(above.axis);
+        let has_values = !node.facts.is_empty();
         let mut changed = node.mark != Mark::None;
         node.facts.retain(|fact| {
             let key = (fact.axis, fact.direction, fact.recorded, fact.what.name());
@@ -57,12 +75,42 @@ impl Filter {
             changed |= is_new;
             is_new
         });
+        let has_new_value = !node.facts.is_empty();
+        if !has_values {
+            changed |= above.has_new_value;
+            // Lines about no axis count and stamp the updates: they are others each time.
+            changed |= axis.is_some_and(|axis| self.is_new_line(axis, above.name.unwrap_or(""), &node.text));
+        }
         let mut children = std::mem::take(&mut node.children);
-        children.retain_mut(|child| self.prune_unchanged(child));
+        // The heading of a frame has its number, and is no name.
+        let name = above.name.map_or_else(String::new, |_| name_of(&node.text));
+        let name = Some(name.as_str());
+        children.retain_mut(|child| self.prune_unchanged(child, Above { axis, name, has_new_value }));
         changed |= !children.is_empty();
         node.children = children;
         changed
     }
+
+    /// Whether a line without a value says something else than the last one of its name.
+    fn is_new_line(&mut self, axis: usize, above: &str, text: &str) -> bool {
+        if self.lines.len() >= LINES_MAX {
+            self.lines.clear();
+        }
+        let key = (axis, format!("{above}/{}", name_of(text)));
+        self.lines.insert(key, text.to_owned()).is_none_or(|last| last != text)
+    }
+}
+
+/// What a line is about: what stands before its first colon, without the numbers behind its first word.
+fn name_of(text: &str) -> String {
+    let name = text.split_once(':').map_or(text, |(name, _)| name);
+    let mut words = name.split(' ');
+    let mut name = words.next().unwrap_or_default().to_owned();
+    for word in words.filter(|word| !word.starts_with(|first: char| first.is_ascii_digit() || first == '-')) {
+        name.push(' ');
+        name.push_str(word);
+    }
+    name
 }
 
 /// Takes out what is about other axes.

@@ -72,6 +72,9 @@ pub use stage::{
 };
 pub use tree::{Mark, Node, Row, RowNames};
 
+/// Lines of an update of the fixed format that are not about its axis: the update, and the node.
+const FIXED_HEAD_LINES: usize = 2;
+
 /// Connection of a drive with its command values, and with its actual values.
 use crate::engine::bus::sercos::{COMMAND_CONNECTION, FEEDBACK_CONNECTION};
 
@@ -83,6 +86,8 @@ struct AxisState {
     heard: Vec<u16>,
     /// The poll connection of a drive on DeviceNet.
     listener: Option<Listener>,
+    /// Whether the gateway saw a fault of the axis at the last frame.
+    has_fault: bool,
 }
 
 /// Translates frame after frame.
@@ -146,6 +151,7 @@ impl Translator {
             came: vec![0; usize::from(axis.south.telegram.feedback_bytes)],
             heard: Vec::new(),
             listener: axis.devicenet().map(Listener::new),
+            has_fault: false,
         });
         states.collect()
     }
@@ -231,7 +237,8 @@ impl Translator {
         Ok(match recognise(bytes)? {
             Recognised::Command(frame, update) => {
                 let mut node = Node::new(format!("C-to-D update {}", frame.header().update_id));
-                node.push(decoded("as it came", &frame.to_string()));
+                let lines = frame.instances().map(|instance| (instance.number, lines_of(&instance)));
+                node.push(self.decoded("as it came", &frame.to_string(), lines));
                 if self.format() == Format::Fixed {
                     node.push(Node::new(
                         "the device has the fixed format: an update of the variable one is refused",
@@ -256,7 +263,8 @@ impl Translator {
             }
             Recognised::FixedCommand(update) => {
                 let mut node = Node::new(format!("C-to-D update {} of the fixed format", update.update_id));
-                node.push(decoded("as it came", &update.to_string()));
+                let text = update.to_string();
+                node.push(self.decoded("as it came", &text, [(1, lines_of(&text) - FIXED_HEAD_LINES)]));
                 // The format has neither Control Status nor Command Control: the device assumes these (clause 6-2.7).
                 let block = update.block(ControlStatus::empty(), CommandTarget::default());
                 self.commands(Update::Fixed(block, update.node_control), &[(1, block, None)], &mut node)?;
@@ -267,14 +275,32 @@ impl Translator {
                 for instance in frame.instances() {
                     facts.extend(instance.cyclic.map(|block| self.reported(instance.number, &block)));
                 }
-                decoded("D-to-C update", &frame.to_string()).shows(facts.into_iter().flatten())
+                let lines = frame.instances().map(|instance| (instance.number, lines_of(&instance)));
+                self.decoded("D-to-C update", &frame.to_string(), lines).shows(facts.into_iter().flatten())
             }
             Recognised::FixedActual(update) => {
                 let facts = self.reported(1, &update.block());
-                decoded("D-to-C update of the fixed format", &update.to_string()).shows(facts)
+                let text = update.to_string();
+                let lines = [(1, lines_of(&text) - FIXED_HEAD_LINES)];
+                self.decoded("D-to-C update of the fixed format", &text, lines).shows(facts)
             }
             Recognised::Sercos(frame) => self.telegram(frame)?,
         })
+    }
+
+    /// An update as it was decoded: a head, and behind it so many lines of each instance, which are about its axis.
+    fn decoded(&self, title: &str, text: &str, instances: impl IntoIterator<Item = (u8, usize)>) -> Node {
+        let of_instances: Vec<_> = instances
+            .into_iter()
+            .flat_map(|(number, lines)| std::iter::repeat_n(self.axis_of_instance(number), lines))
+            .collect();
+        let head = lines_of(&text).saturating_sub(of_instances.len());
+        let axes = std::iter::repeat_n(None, head).chain(of_instances);
+        let mut node = Node::new(title);
+        for (line, axis) in text.lines().zip(axes) {
+            node.push(Node { axis, ..Node::new(line.trim_end()) });
+        }
+        node
     }
 
     /// What the device has told the controller of an axis.
@@ -375,11 +401,9 @@ fn unknown<'n>(what: &'static str, known: impl Iterator<Item = &'n str>, name: &
     TranslateError::Name { what, known, name: name.to_owned() }
 }
 
-/// A tree that is shown as it was decoded.
-fn decoded(title: &str, text: &str) -> Node {
-    let mut node = Node::new(title);
-    text.lines().for_each(|line| node.push(Node::new(line.trim_end())));
-    node
+/// Lines that something has as text.
+fn lines_of(shown: &impl ToString) -> usize {
+    shown.to_string().lines().count()
 }
 
 /// Flags by their names, or that there are none.

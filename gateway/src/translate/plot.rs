@@ -107,7 +107,7 @@ impl Plot {
             for fact in &node.facts {
                 let Some(panel) = panels.get_mut(fact.axis) else { continue };
                 match fact.what {
-                    What::Fault(cause) if panel.faults.len() < MARKS_MAX => {
+                    What::Fault(Some(cause)) if panel.faults.len() < MARKS_MAX => {
                         panel.faults.push((time, cause.to_string()))
                     }
                     // What the gateway would send, or report, of this frame alone is not what went over the wire.
@@ -367,7 +367,7 @@ mod tests {
             &stage,
             &Entry {
                 place,
-                tree: Node::new("fault").shows([fact(Direction::FromDrive, What::Fault(cause))]),
+                tree: Node::new("fault").shows([fact(Direction::FromDrive, What::Fault(Some(cause)))]),
             },
         );
         let svg = plot.svg(&stage, "test <1>");

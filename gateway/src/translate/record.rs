@@ -53,7 +53,7 @@ pub struct ValueRecord<'a> {
     /// Name of the signal in the generic model, such as `position_command`, or `mode`, `action`, `report`, `state`,
     /// `axis_state`, `request`, `status`, `control_word`, `fault`.
     pub signal: &'a str,
-    /// The value in its unit; null of a command that the drive does not follow.
+    /// The value in its unit; null of a command that the drive does not follow, and of a fault that has ended.
     pub value: Scalar<'a>,
     /// Unit of the value; empty of a name.
     pub unit: &'a str,
@@ -178,7 +178,7 @@ impl What {
     fn scalar(&self) -> Scalar<'static> {
         let name = |text: String| Scalar::Name(Cow::Owned(text));
         match *self {
-            Self::Signal(_, _) | Self::Mode(None) => Scalar::Nothing,
+            Self::Signal(_, _) | Self::Mode(None) | Self::Fault(None) => Scalar::Nothing,
             Self::Mode(Some(mode)) => Scalar::Name(Cow::Borrowed(mode.name())),
             Self::Action(action) => Scalar::Name(Cow::Borrowed(action.name())),
             Self::Report(report) => Scalar::Name(Cow::Borrowed(report.name())),
@@ -190,7 +190,7 @@ impl What {
                 name(names.join(","))
             }
             Self::ControlWord(word) => Scalar::Number(word.into()),
-            Self::Fault(cause) => name(cause.to_string()),
+            Self::Fault(Some(cause)) => name(cause.to_string()),
         }
     }
 }

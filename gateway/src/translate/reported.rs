@@ -5,7 +5,7 @@ use profile_cia402::master::config::Direction;
 use profile_cip::wire::Writer;
 use profile_cip::wire::motion::fixed::FixedActual;
 use profile_cip::wire::motion::{ActualBlock, ActualFrame, ActualPosition};
-use profile_generic::image::Signal;
+use profile_generic::image::{Signal, StatusBits};
 use profile_generic::mode::OperatingMode;
 
 use super::commanded::push_notices;
@@ -15,6 +15,7 @@ use super::telegram::{frames, raw};
 use super::tree::{Mark, Row, hex, text};
 use super::{Node, TranslateError, Translator, devicenet, flags, shown};
 use crate::engine::notice::Notice;
+use crate::mapping::Origin;
 
 /// Octets of the longest cyclic actual block.
 const BLOCK_MAX: usize = 128;
@@ -116,12 +117,8 @@ impl Translator {
             for (idn, word) in &words {
                 status.push(Node::new(text!("{} {word:#06x}", self.named(*idn))));
             }
-            if !feedback.status.is_empty() {
-                let rows = axis.status_rows(mapping, word, &words);
-                let fact = heard(What::Status(feedback.status), None);
-                let text = text!("status: {}", flags(feedback.status.iter_names()));
-                status.push(Node::new(text).by(rows).shows([fact]));
-            }
+            let rows = || axis.status_rows(mapping, word, &words);
+            push_status(&mut status, feedback.status, heard(What::Status(feedback.status), None), rows);
             node.push(status);
             if let Some((item, octet)) = heads.next().zip(axis.south.mode_octet(word)) {
                 node.push(
@@ -133,9 +130,8 @@ impl Translator {
             let text = text!("{}: {told}, mode {shown_mode}", devicenet::told(axis, row));
             let facts = [heard(What::Report(told), None), heard(What::Mode(generic_mode), None)];
             let mut status = Node::new(text).by(axis.report_row(mapping, word)).by(mode_row()).shows(facts);
-            if !feedback.status.is_empty() {
-                status.push(Node::new(text!("status: {}", flags(feedback.status.iter_names()))));
-            }
+            let rows = || axis.status_rows(mapping, word, &[]);
+            push_status(&mut status, feedback.status, heard(What::Status(feedback.status), None), rows);
             node.push(status);
             for field in axis.south.feedback.fields() {
                 let Some(value) = feedback.get(field.signal) else { continue };
@@ -175,6 +171,7 @@ impl Translator {
         let stage = std::sync::Arc::clone(&self.stage);
         let (axis, mapping) = (&stage.axes[number], &stage.mapping);
         let state = self.bench()?.engine().axes()[number].state();
+        let ended = self.fault_ended(number);
         let Some(block) = self.block_of(number) else {
             return Ok(Node::new("the device sends no update"));
         };
@@ -203,7 +200,8 @@ impl Translator {
                 .shows([
                     report(What::State(state), None),
                     report(What::AxisState(block.axis_state), Some(raw)),
-                ]),
+                ])
+                .shows(ended),
         );
         let values: Vec<_> = of_actual(&block, &axis.scaling).collect();
         push_values(&mut node, &block, |signal| {
@@ -212,6 +210,19 @@ impl Translator {
             (axis.cyclic_row(mapping, signal), fact)
         });
         Ok(node)
+    }
+
+    /// That the gateway sees no fault of an axis any more, once after each time that it saw one.
+    pub(super) fn fault_ended(&mut self, number: usize) -> Option<Fact> {
+        let has_fault = self.bench().ok()?.engine().axes()[number].fault().is_some();
+        let had_fault = std::mem::replace(&mut self.states[number].has_fault, has_fault);
+        (had_fault && !has_fault).then_some(Fact {
+            axis: number,
+            direction: Way::ToController,
+            recorded: false,
+            what: What::Fault(None),
+            raw: None,
+        })
     }
 
     /// The cyclic block of an axis in the newest update of its device.
@@ -224,6 +235,16 @@ impl Translator {
         let frame = ActualFrame::parse(&update).ok()?;
         frame.instances().find(|known| known.number == instance)?.cyclic
     }
+}
+
+/// What a drive reports beside its state: a line below the one of its state, which has the value itself if that is nothing.
+fn push_status(node: &mut Node, status: StatusBits, fact: Fact, rows: impl FnOnce() -> Vec<Origin>) {
+    if status.is_empty() {
+        node.facts.push(fact);
+        return;
+    }
+    let text = text!("status: {}", flags(status.iter_names()));
+    node.push(Node::new(text).by(rows()).shows([fact]));
 }
 
 /// Actual values and status words of a block.

@@ -60,7 +60,7 @@ fn stage_of(text: &str) -> Stage {
     Stage::rehearse(&Config::parse(text, "box.toml").unwrap(), Mapping::embedded().unwrap()).unwrap()
 }
 
-fn stage() -> Stage {
+pub(super) fn stage() -> Stage {
     stage_of(BOX)
 }
 

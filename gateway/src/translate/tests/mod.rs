@@ -4,6 +4,7 @@ use profile_cip::wire::motion::{
 };
 
 mod can;
+mod changes;
 mod devicenet;
 
 use profile_generic::mode::OperatingMode;
