@@ -124,6 +124,7 @@ mod tests {
         Frame {
             number: 1,
             at: None,
+            section: 0,
             interface: 0,
             interface_name: name,
             interface_description: description,

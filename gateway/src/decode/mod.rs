@@ -203,6 +203,8 @@ pub(crate) struct Decoder<'n> {
     buses: Vec<(Option<u32>, DecodeContext<'n>)>,
     can: CanBuses,
     /// By interface.
+    /// The section whose interfaces they are.
+    section: u64,
     can_buses: Vec<(u32, CanBus)>,
     ethernet_ip: EtherNetIp,
     start: Option<KernelTime>,
@@ -215,6 +217,7 @@ impl<'n> Decoder<'n> {
             names,
             buses: Vec::new(),
             can: CanBuses::default(),
+            section: 0,
             can_buses: Vec::new(),
             ethernet_ip: EtherNetIp::default(),
             start: None,
@@ -295,6 +298,7 @@ impl<'n> Decoder<'n> {
             Ok(record) => self.text.append(format_args!("CAN {record}")),
             Err(error) => self.text.append(format_args!("CAN, not readable: {error}")),
         }
+        self.enter(frame);
         self.comment(frame);
         let Ok(Record::Frame(content)) = record else { return };
         let known = self.can_buses.iter().position(|(interface, _)| *interface == frame.interface);
@@ -312,6 +316,14 @@ impl<'n> Decoder<'n> {
             CanBus::Canopen(bus) => bus.frame(&content, &mut self.text),
             CanBus::Devicenet(bus) => bus.frame(&content, &mut self.text),
         }
+    /// Forgets the interfaces of the section before: their numbers begin anew.
+    fn enter(&mut self, frame: &Frame<'_>) {
+        if std::mem::replace(&mut self.section, frame.section) != frame.section {
+            self.buses.retain(|(interface, _)| interface.is_none());
+            self.can_buses.clear();
+        }
+    }
+
     }
 
     /// Seconds since the first frame.
@@ -342,6 +354,7 @@ impl<'n> Decoder<'n> {
     }
 
     /// What is known of the bus of a frame. The two ports of this box are on the same one; each interface of another
+        self.enter(frame);
     /// recorder is taken for a bus of its own.
     pub(crate) fn bus(&mut self, frame: &Frame<'_>) -> &mut DecodeContext<'n> {
         let own = frame.interface_name.and_then(Side::of_name).is_some();

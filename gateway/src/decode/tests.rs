@@ -268,6 +268,25 @@ fn a_visit_of_a_controller_is_read() {
     insta::assert_snapshot!(visit().text(&Options::default()));
 }
 
+/// The numbers of interfaces begin anew in a section, and so does what is known of them.
+#[test]
+fn a_section_has_buses_of_its_own() {
+    let section = |description: &str| {
+        let mut file = Writer::new(Vec::new(), ["north", "none", "none"], &[description]).unwrap();
+        let poll =
+            profile_generic::can::Frame::new(profile_generic::can::Id::Standard(0x44D), &[0x61, 0, 0xDC, 5]);
+        file.can_frame(0, KernelTime(1_000_000_000), &poll.unwrap(), None).unwrap();
+        file.finish().unwrap()
+    };
+    let second = section("can1, DeviceNet");
+    let (alone, _) = decoded(&second, &Options::default());
+    let (both, summary) = decoded(&[section("can0, CANopen"), second].concat(), &Options::default());
+    assert_eq!(summary.frames, 2);
+    assert!(alone.contains("poll"), "{alone}");
+    let (_, last) = both.split_once("frame 2").unwrap();
+    assert_eq!(last.lines().skip(1).collect::<Vec<_>>(), alone.lines().skip(1).collect::<Vec<_>>());
+}
+
 #[test]
 fn requests_in_requests_and_refusals_are_read() {
     let mut recording = Recording::new();

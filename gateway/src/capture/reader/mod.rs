@@ -107,6 +107,8 @@ pub struct Frame<'a> {
     pub number: u64,
     /// When it was recorded; `None` in simple packet blocks.
     pub at: Option<KernelTime>,
+    /// Number of its section, from 0; a section has interfaces of its own.
+    pub section: u64,
     /// Number of the interface in its section; 0 in pcap files.
     pub interface: u32,
     /// Name of the interface, where the file has one.
@@ -190,7 +192,7 @@ struct Interface {
 #[derive(Debug)]
 enum Format {
     Pcap { endian: Endian, unit: TimeUnit, link_type: u16 },
-    PcapNg { endian: Endian, interfaces: Vec<Interface> },
+    PcapNg { endian: Endian, section: u64, interfaces: Vec<Interface> },
 }
 
 /// An open recording.
@@ -230,7 +232,7 @@ impl<R: Read> Reader<R> {
             [0x4D, 0x3C, 0xB2, 0xA1] => pcap_header(&mut source, Endian::Little, 1_000_000_000)?,
             [0x0A, 0x0D, 0x0D, 0x0A] => {
                 let endian = section_header(&mut source, 0)?;
-                Format::PcapNg { endian, interfaces: Vec::new() }
+                Format::PcapNg { endian, section: 0, interfaces: Vec::new() }
             }
             _ => return Err(ReadError::UnknownFormat { found: magic }),
         };
@@ -291,9 +293,10 @@ impl<R: Read> Reader<R> {
         }))
     }
 
+            section: 0,
     fn next_pcapng(&mut self) -> Result<Option<Frame<'_>>, ReadError> {
         let Some(packet) = self.next_packet()? else { return Ok(None) };
-        let Format::PcapNg { endian, interfaces } = &self.format else { return Ok(None) };
+        let Format::PcapNg { endian, section, interfaces } = &self.format else { return Ok(None) };
         let interface = &interfaces[packet.index];
         let comment = packet.options_at.and_then(|at| {
             let mut options = Options::new(&self.body, at, *endian);
@@ -314,9 +317,10 @@ impl<R: Read> Reader<R> {
         }))
     }
 
+            section: *section,
     /// Reads blocks up to the next one that carries a packet; its body is left in `self.body`.
     fn next_packet(&mut self) -> Result<Option<Packet>, ReadError> {
-        let Format::PcapNg { endian, interfaces } = &mut self.format else { return Ok(None) };
+        let Format::PcapNg { endian, section, interfaces } = &mut self.format else { return Ok(None) };
         loop {
             let start = self.source.offset;
             let mut kind = [0; 4];
@@ -337,6 +341,7 @@ impl<R: Read> Reader<R> {
                         offset: start,
                         what: "the number of interfaces",
                         expected: "at most 1024",
+                *section += 1;
                         found: 1025,
                     });
                 }

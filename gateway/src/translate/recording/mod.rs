@@ -132,6 +132,7 @@ impl Recording<'_> {
     }
 
     fn frame(&mut self, frame: &Frame<'_>, place: Place, sink: Sink<'_>) -> Outcome {
+        self.oddities.enter(frame);
         if let Some(why) = self.oddities.other_gateway(frame) {
             return Outcome::LeftOut(why);
         }

@@ -30,6 +30,8 @@ pub(super) struct Oddities {
     strangers: HashSet<Ipv4Addr>,
     /// The device that stands for the first of the configuration.
     first_device: Option<Ipv4Addr>,
+    /// The section whose interfaces these are.
+    section: u64,
     /// Interface of each side of the gateway.
     own: HashMap<usize, u32>,
     /// Sequence counts by connection and ends.
@@ -49,7 +51,15 @@ impl Oddities {
             .then(|| format!("nothing was recorded for {} s", seconds(at - latest)))
     }
 
-    /// Whether a frame is of a second gateway in the same file; the first one of an interface says so.
+    /// Forgets the interfaces of the section before: their numbers begin anew.
+    pub fn enter(&mut self, frame: &Frame<'_>) {
+        if std::mem::replace(&mut self.section, frame.section) != frame.section {
+            self.own.clear();
+            self.left_out.clear();
+        }
+    }
+
+    /// Whether a frame is of a second gateway in the same section; the first one of an interface says so.
     pub fn other_gateway(&mut self, frame: &Frame<'_>) -> Option<Option<String>> {
         let side = frame.interface_name.and_then(Side::of_name)?;
         let own = *self.own.entry(side.index()).or_insert(frame.interface);

@@ -85,6 +85,24 @@ fn a_recording_cut_in_the_middle_is_translated_up_to_the_cut() {
 }
 
 #[test]
+fn a_section_may_have_its_interfaces_in_another_order() {
+    let mut file = writer();
+    (1..=2).for_each(|count| put(&mut file, u64::from(count), count, BOX));
+    let mut file = file.finish().unwrap();
+    let mut second = writer();
+    (3..=4).for_each(|count| put(&mut second, u64::from(count), count, BOX));
+    let second = second.finish().unwrap();
+    let mut blocks = blocks(&second).into_iter().map(<[u8]>::to_vec).collect::<Vec<_>>();
+    blocks.swap(1, 2);
+    for block in &mut blocks {
+        block[8] += u8::from(block[0] == 6);
+    }
+    assert_eq!([blocks[0][0], blocks[1][0], blocks[2][0]], [0x0A, 1, 1]);
+    file.extend(blocks.concat());
+    assert_eq!(translated(&file), (String::new(), counts(4, 0, 0), None));
+}
+
+#[test]
 fn missing_updates_and_a_silence_are_said_and_the_rest_is_translated() {
     let mut file = writer();
     for (time, count) in [(0, 1), (2, 2), (10, 6), (12, 6), (1500, 7)] {
