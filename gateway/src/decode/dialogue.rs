@@ -1,7 +1,6 @@
 //! What a controller asks of a device and how it is answered, frame by frame: the services, and the state that updates show.
 
 use profile_cip::wire::class1::Class1Datagram;
-use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::message_router::Reply;
 use profile_cip::wire::motion::attribute_list::{GetItem, GetResponse, SetResponse};
 use profile_cip::wire::motion::codes::{
@@ -17,7 +16,7 @@ use profile_cip::wire::status::{ConnectionStatus, GeneralStatus, Service};
 use super::connections::CLASS_MOTION;
 use super::ethernet_ip::{Answered, EtherNetIp};
 use super::explicit::service_name;
-use super::packet::Packet;
+use super::packet::{Packet, is_io};
 use super::text::Text;
 
 /// Something that a frame shows.
@@ -64,7 +63,7 @@ impl Dialogue {
                 self.ethernet_ip.segment(segment, &mut self.text);
                 self.ethernet_ip.take_replies().iter().for_each(|answered| explicit(answered, &mut show));
             }
-            Packet::Udp { to, payload, .. } if to.port() == IO_PORT => {
+            Packet::Udp { from, to, payload } if is_io(*from, *to) => {
                 if let Ok(datagram) = Class1Datagram::parse(payload) {
                     update(datagram.data, &mut show);
                 }

@@ -5,7 +5,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 
 use profile_cip::wire::class1::Class1Datagram;
 use profile_cip::wire::cpf::{CommonPacket, EncapsulatedPacket, ItemType};
-use profile_cip::wire::encapsulation::{Command, EXPLICIT_PORT, HEADER_LEN, Header, IO_PORT, Packet};
+use profile_cip::wire::encapsulation::{Command, EXPLICIT_PORT, HEADER_LEN, Header, Packet};
 use profile_cip::wire::list_identity::IdentityItem;
 use profile_cip::wire::list_services::ServicesItem;
 use profile_cip::wire::register_session::RegisterSession;
@@ -15,7 +15,7 @@ use profile_cip::wire::status::REPLY_BIT;
 use super::Protocol;
 use super::connections::{Connection, Connections, Direction};
 use super::explicit::{self, Asked, Effect, unreadable};
-use super::packet::Segment;
+use super::packet::{Segment, is_io};
 use super::stream::{Arrival, Streams};
 use super::text::Text;
 
@@ -90,7 +90,7 @@ impl EtherNetIp {
                 Ok(packet) => self.context.message(from, to, &packet, text),
                 Err(error) => unreadable(text, 1, "encapsulation message", error, payload),
             }
-        } else if to.port() == IO_PORT {
+        } else if is_io(from, to) {
             match Class1Datagram::parse(payload) {
                 Ok(datagram) => self.context.class1(from, to, &datagram, text),
                 Err(error) => unreadable(text, 1, "class 1 datagram", error, payload),

@@ -19,7 +19,6 @@ mod text;
 use std::io::{self, Read, Write};
 use std::net::Ipv4Addr;
 
-use profile_cip::wire::encapsulation::IO_PORT;
 use profile_sercos::wire::describe::{DecodeContext, Names, describe, follow};
 use thiserror::Error;
 
@@ -33,7 +32,7 @@ use crate::translate::fact::number_of;
 use canopen::Canopen;
 use devicenet::Devicenet;
 use ethernet_ip::EtherNetIp;
-use packet::Packet;
+use packet::{Packet, is_io};
 use record::DecodeRecord;
 use text::Text;
 
@@ -236,7 +235,7 @@ impl<'n> Decoder<'n> {
         match packet {
             Packet::Sercos => follow(frame.data, self.bus(frame)),
             // Cyclic data change nothing of what is known.
-            Packet::Udp { to, .. } if to.port() == IO_PORT => {}
+            Packet::Udp { from, to, .. } if is_io(*from, *to) => {}
             Packet::Udp { from, to, payload } => {
                 self.text.clear();
                 self.ethernet_ip.datagram(*from, *to, payload, &mut self.text);

@@ -2,6 +2,8 @@
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
+use profile_cip::wire::encapsulation::IO_PORT;
+
 const ETHERNET_LEN: usize = 14;
 const VLAN_LEN: usize = 4;
 /// Tags of a frame that are passed over: one, or two where a provider added its own.
@@ -49,6 +51,12 @@ pub(crate) fn parse(frame: &[u8]) -> Packet<'_> {
     };
     let mut at = ETHERNET_LEN;
     for _ in 0..VLANS_MAX {
+/// Whether a datagram between these ends has data of a class 1 connection. They go to the I/O port, or from it to the port that
+/// the originator has named in its Forward_Open.
+pub(crate) const fn is_io(from: SocketAddrV4, to: SocketAddrV4) -> bool {
+    from.port() == IO_PORT || to.port() == IO_PORT
+}
+
         if ether_type != ETHER_TYPE_VLAN && ether_type != ETHER_TYPE_VLAN_OUTER {
             break;
         }

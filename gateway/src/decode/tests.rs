@@ -16,6 +16,7 @@ use profile_cip::wire::motion::{
     CommandHeader, CommandInstance, CommandPosition, CommandValues, CommandWriter,
 };
 use profile_cip::wire::network_parameters::{ConnectionType, NetworkParameters, Priority};
+use profile_cip::wire::sockaddr::SockaddrInfo;
 use profile_cip::wire::status::{GeneralStatus, Service};
 use profile_cip::wire::unconnected_send::UnconnectedSend;
 use profile_cip::wire::{ConnectionTriad, multiple_service};
@@ -27,6 +28,7 @@ use super::*;
 use crate::capture::Side;
 use crate::capture::synth::Synthesizer;
 use crate::capture::writer::Writer;
+use crate::decode::dialogue::{Dialogue, Shown};
 
 const CLIENT: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(192, 0, 2, 1), 50_000);
 const SERVER: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(192, 0, 2, 2), 44_818);
@@ -105,10 +107,16 @@ fn message(command: Command, context: u8, data: &[u8]) -> Vec<u8> {
 }
 
 fn send_rr_data(context: u8, cip: &[u8]) -> Vec<u8> {
-    let items = CommonPacket::new(&[
+    send_rr_data_with(context, cip, &[])
+}
+
+/// The same with further items.
+fn send_rr_data_with(context: u8, cip: &[u8], more: &[Item<'_>]) -> Vec<u8> {
+    let items = [
         Item { item_type: ItemType::NULL_ADDRESS, data: &[] },
         Item { item_type: ItemType::UNCONNECTED_DATA, data: cip },
-    ]);
+    ];
+    let items = CommonPacket::new(&[&items, more].concat());
     let packet = EncapsulatedPacket { packet: items, ..EncapsulatedPacket::default() };
     let data = emitted(packet.buffer_len(), |buffer| packet.emit(buffer).unwrap());
     message(Command::SEND_RR_DATA, context, &data)
@@ -266,6 +274,27 @@ fn visit() -> Recording {
 #[test]
 fn a_visit_of_a_controller_is_read() {
     insta::assert_snapshot!(visit().text(&Options::default()));
+}
+
+/// An originator may name any port for the data of the target, which come from port 2222.
+#[test]
+fn data_to_another_port_that_the_originator_named_are_read() {
+    let mut recording = Recording::new();
+    let mut port = [0; 16];
+    let address = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, CLIENT.port());
+    SockaddrInfo { address }.emit(&mut port).unwrap();
+    let port = [Item { item_type: ItemType::SOCKADDR_T_TO_O, data: &port }];
+    recording.tcp(CLIENT, SERVER, &send_rr_data_with(1, &open_request(0x42), &port));
+    recording.reply(1, &open_reply());
+    let update = class1(T_TO_O, 1, &actual_update());
+    recording.udp(SERVER_IO, CLIENT, &update);
+    let text = recording.text(&Options::default());
+    assert!(text.contains("count 1 with 28 bytes (T->O of connection 0x1234"), "{text}");
+    assert!(text.contains("Axis State: Running"), "{text}");
+    let mut shown = Vec::new();
+    let packet = packet::Packet::Udp { from: SERVER_IO, to: CLIENT, payload: &update };
+    Dialogue::default().packet(&packet, |one| shown.push(one));
+    assert_eq!(shown, [Shown::Running]);
 }
 
 /// The numbers of interfaces begin anew in a section, and so does what is known of them.

@@ -1,12 +1,11 @@
 //! What some bytes are: a whole Ethernet frame, a class 1 datagram, an update, a SERCOS telegram.
 
 use profile_cip::wire::class1::{Class1Datagram, SEQUENCE_COUNT_LEN};
-use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::motion::codes::ConnectionFormat;
 use profile_cip::wire::motion::fixed::{FixedActual, FixedCommand};
 use profile_cip::wire::motion::{ActualFrame, CommandFrame, FORMAT_REVISION_RUN_IDLE, run_idle};
 
-use crate::decode::packet::{self, Packet};
+use crate::decode::packet::{self, Packet, is_io};
 
 /// Octets of an update of the fixed formats.
 const FIXED_LEN: usize = 16;
@@ -51,7 +50,7 @@ pub enum FrameError {
 pub fn recognise(bytes: &[u8]) -> Result<Recognised<'_>, FrameError> {
     match packet::parse(bytes) {
         Packet::Sercos => return Ok(Recognised::Sercos(bytes)),
-        Packet::Udp { from, to, payload } if from.port() == IO_PORT || to.port() == IO_PORT => {
+        Packet::Udp { from, to, payload } if is_io(from, to) => {
             let datagram =
                 Class1Datagram::parse(payload).map_err(|error| FrameError::Other(error.to_string()))?;
             return connected(datagram.data);

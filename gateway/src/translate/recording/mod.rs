@@ -19,7 +19,6 @@ use std::sync::Arc;
 
 use profile_cia402::wire::cob_id;
 use profile_cip::wire::class1::Class1Datagram;
-use profile_cip::wire::encapsulation::IO_PORT;
 use profile_sercos::wire::describe::Names;
 use profile_sercos::wire::header::{Header, Phase};
 
@@ -32,7 +31,7 @@ use crate::capture::can_bus::{CanBuses, CanProtocol};
 use crate::capture::reader::{Frame, LINK_TYPE_ETHERNET, ReadError, Reader};
 use crate::config::Config;
 use crate::decode::Decoder;
-use crate::decode::packet::{self, Packet};
+use crate::decode::packet::{self, Packet, is_io};
 
 /// What a frame came to.
 enum Outcome {
@@ -206,8 +205,7 @@ impl Recording<'_> {
                 }
                 is_cyclic
             }
-            Packet::Udp { from, to, payload } if to.port() == IO_PORT => match Class1Datagram::parse(payload)
-            {
+            Packet::Udp { from, to, payload } if is_io(from, to) => match Class1Datagram::parse(payload) {
                 Ok(datagram) => {
                     let ends = (*from.ip(), *to.ip());
                     let known = self.decoder.connection(datagram.connection_id, ends.0, ends.1);

@@ -1,6 +1,13 @@
 use std::net::SocketAddrV4;
 
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
+use profile_cip::wire::encapsulation::IO_PORT;
+use profile_cip::wire::motion::codes::{
+    AxisControl, AxisStateCode, ControlMode, NodeAlarm, NodeFault, NodeStatus,
+};
+use profile_cip::wire::motion::{
+    ActualBlock, ActualHeader, ActualInstance, ActualPosition, ActualValues, ActualWriter,
+};
 use profile_generic::can::{Frame as CanFrame, Id};
 use profile_sercos::wire::describe::NoNames;
 
@@ -39,6 +46,65 @@ fn put(file: &mut Writer<Vec<u8>>, time_ms: u64, count: u16, device: Ipv4Addr) {
     Synthesizer::new()
         .udp(from, to, 0, &datagram, &mut |frame| file.frame(Side::North, at, frame, None).unwrap())
         .unwrap();
+}
+
+/// A datagram at a time.
+fn put_datagram(file: &mut Writer<Vec<u8>>, time_ms: u64, ends: (SocketAddrV4, SocketAddrV4), data: &[u8]) {
+    let at = KernelTime(1_000_000_000 + time_ms * 1_000_000);
+    Synthesizer::new()
+        .udp(ends.0, ends.1, 0, data, &mut |frame| file.frame(Side::North, at, frame, None).unwrap())
+        .unwrap();
+}
+
+/// An update of the turntable, running.
+fn actual() -> Vec<u8> {
+    let header = ActualHeader {
+        update_id: 17,
+        node_status: NodeStatus::REMOTE_MODE | NodeStatus::DATA_VALID,
+        instance_count: 1,
+        node_fault: NodeFault(0),
+        node_alarm: NodeAlarm(0),
+        last_received_id: 17,
+        time_stamp: None,
+        time_offset: None,
+        update_diagnostics: None,
+        time_diagnostics: None,
+    };
+    let cyclic = ActualBlock {
+        control_mode: ControlMode::POSITION,
+        axis_response: AxisControl::ENABLE,
+        axis_state: AxisStateCode::RUNNING,
+        actual: ActualValues { position: Some(ActualPosition::Dint(250_000)), ..ActualValues::default() },
+        ..ActualBlock::default()
+    };
+    let mut update = [0; 200];
+    let mut writer = ActualWriter::new(&mut update, &header).unwrap();
+    writer
+        .instance(&ActualInstance { number: 1, cyclic: Some(cyclic), ..ActualInstance::default() })
+        .unwrap();
+    let len = writer.finish();
+    let datagram = Class1Datagram {
+        connection_id: 78,
+        encapsulation_sequence: 1,
+        sequence_count: 1,
+        data: &update[..len],
+    };
+    let mut bytes = vec![0; datagram.buffer_len()];
+    datagram.emit(&mut bytes).unwrap();
+    bytes
+}
+
+/// Everything that is written of a recording, with the demonstration's configuration.
+fn everything(file: &[u8]) -> (String, Counts) {
+    let config = config();
+    let stage = Arc::new(Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap());
+    let mut text = String::new();
+    let captured =
+        translate_capture(&stage, &config, Reader::new(file).unwrap(), &NoNames, u64::MAX, &mut |entry| {
+            entry.tree.write(&mut text, 0, RowNames::Keys).unwrap();
+            true
+        });
+    (text, captured.counts)
 }
 
 /// What is said, whatever it is beside the values; counts; and the error at the end.
@@ -82,6 +148,16 @@ fn a_recording_cut_in_the_middle_is_translated_up_to_the_cut() {
     assert_eq!((said.as_str(), found), ("", counts(2, 0, 0)));
     let error = error.unwrap();
     assert!(error.contains("the file ends in the middle of"), "{error}");
+}
+
+#[test]
+fn updates_to_the_port_that_a_controller_named_are_translated() {
+    let mut file = writer();
+    let ends = (SocketAddrV4::new(BOX, IO_PORT), SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 50_000));
+    put_datagram(&mut file, 0, ends, &actual());
+    let (text, found) = everything(&file.finish().unwrap());
+    assert_eq!(found, counts(1, 0, 0), "{text}");
+    assert!(text.contains("Axis State: Running"), "{text}");
 }
 
 #[test]
