@@ -202,9 +202,9 @@ pub(crate) struct Decoder<'n> {
     buses: Vec<(Option<u32>, DecodeContext<'n>)>,
     can: CanBuses,
     /// By interface.
+    can_buses: Vec<(u32, CanBus)>,
     /// The section whose interfaces they are.
     section: u64,
-    can_buses: Vec<(u32, CanBus)>,
     ethernet_ip: EtherNetIp,
     start: Option<KernelTime>,
     text: Text,
@@ -216,8 +216,8 @@ impl<'n> Decoder<'n> {
             names,
             buses: Vec::new(),
             can: CanBuses::default(),
-            section: 0,
             can_buses: Vec::new(),
+            section: 0,
             ethernet_ip: EtherNetIp::default(),
             start: None,
             text: Text::default(),
@@ -244,7 +244,7 @@ impl<'n> Decoder<'n> {
                 self.text.clear();
                 self.ethernet_ip.segment(segment, &mut self.text);
             }
-            Packet::Other(_) => {}
+            Packet::CutUdp { .. } | Packet::Other(_) => {}
         }
     }
 
@@ -278,15 +278,14 @@ impl<'n> Decoder<'n> {
                 self.comment(frame);
                 self.ethernet_ip.segment(&segment, &mut self.text)
             }
-            Packet::Other(what) => {
+            Packet::Other(what) | Packet::CutUdp { what, .. } => {
                 self.text.append(format_args!("{what}"));
                 self.comment(frame);
                 Protocol::Other
             }
         };
-        let lost = usize::try_from(frame.original_len).unwrap_or(usize::MAX).saturating_sub(frame.data.len());
-        if lost > 0 {
-            self.text.line(1, format_args!("cut in the recording: {lost} bytes are missing"));
+        if let Some(cut) = frame.cut() {
+            self.text.line(1, format_args!("{cut}"));
         }
         protocol
     }
@@ -297,9 +296,9 @@ impl<'n> Decoder<'n> {
             Ok(record) => self.text.append(format_args!("CAN {record}")),
             Err(error) => self.text.append(format_args!("CAN, not readable: {error}")),
         }
-        self.enter(frame);
         self.comment(frame);
         let Ok(Record::Frame(content)) = record else { return };
+        self.enter(frame);
         let known = self.can_buses.iter().position(|(interface, _)| *interface == frame.interface);
         let index = known.unwrap_or_else(|| {
             let protocol = self.can.find(frame).map(|bus| bus.protocol);
@@ -315,14 +314,14 @@ impl<'n> Decoder<'n> {
             CanBus::Canopen(bus) => bus.frame(&content, &mut self.text),
             CanBus::Devicenet(bus) => bus.frame(&content, &mut self.text),
         }
+    }
+
     /// Forgets the interfaces of the section before: their numbers begin anew.
     fn enter(&mut self, frame: &Frame<'_>) {
         if std::mem::replace(&mut self.section, frame.section) != frame.section {
             self.buses.retain(|(interface, _)| interface.is_none());
             self.can_buses.clear();
         }
-    }
-
     }
 
     /// Seconds since the first frame.
@@ -353,9 +352,9 @@ impl<'n> Decoder<'n> {
     }
 
     /// What is known of the bus of a frame. The two ports of this box are on the same one; each interface of another
-        self.enter(frame);
     /// recorder is taken for a bus of its own.
     pub(crate) fn bus(&mut self, frame: &Frame<'_>) -> &mut DecodeContext<'n> {
+        self.enter(frame);
         let own = frame.interface_name.and_then(Side::of_name).is_some();
         let bus = (!own).then_some(frame.interface);
         let known = self.buses.iter().position(|(other, _)| *other == bus);

@@ -39,9 +39,22 @@ pub(crate) enum Packet<'a> {
         to: SocketAddrV4,
         payload: &'a [u8],
     },
+    /// The beginning of a UDP datagram, and in words what is missing.
+    CutUdp {
+        from: SocketAddrV4,
+        to: SocketAddrV4,
+        payload: &'a [u8],
+        what: String,
+    },
     Tcp(Segment<'a>),
     /// Something else, in words.
     Other(String),
+}
+
+/// Whether a datagram between these ends has data of a class 1 connection. They go to the I/O port, or from it to the port that
+/// the originator has named in its Forward_Open.
+pub(crate) const fn is_io(from: SocketAddrV4, to: SocketAddrV4) -> bool {
+    from.port() == IO_PORT || to.port() == IO_PORT
 }
 
 /// Reads an Ethernet frame.
@@ -51,12 +64,6 @@ pub(crate) fn parse(frame: &[u8]) -> Packet<'_> {
     };
     let mut at = ETHERNET_LEN;
     for _ in 0..VLANS_MAX {
-/// Whether a datagram between these ends has data of a class 1 connection. They go to the I/O port, or from it to the port that
-/// the originator has named in its Forward_Open.
-pub(crate) const fn is_io(from: SocketAddrV4, to: SocketAddrV4) -> bool {
-    from.port() == IO_PORT || to.port() == IO_PORT
-}
-
         if ether_type != ETHER_TYPE_VLAN && ether_type != ETHER_TYPE_VLAN_OUTER {
             break;
         }
@@ -84,15 +91,22 @@ fn ipv4(packet: &[u8]) -> Packet<'_> {
     if header[0] >> 4 != 4 || header_len < 20 || total_len < header_len {
         return Packet::Other("IPv4 header with impossible version or lengths".to_owned());
     }
-    // Ethernet fills short frames up: what is behind the packet is not of it.
-    let Some(payload) = packet.get(header_len..total_len) else {
-        return short("IPv4 packet", total_len, packet.len());
-    };
-    if u16::from_be_bytes([header[6], header[7]]) & FRAGMENT != 0 {
-        return Packet::Other("IPv4 fragment, not decoded".to_owned());
-    }
+    let is_fragment = u16::from_be_bytes([header[6], header[7]]) & FRAGMENT != 0;
     let from = Ipv4Addr::new(header[12], header[13], header[14], header[15]);
     let to = Ipv4Addr::new(header[16], header[17], header[18], header[19]);
+    // Ethernet fills short frames up: what is behind the packet is not of it.
+    let Some(payload) = packet.get(header_len..total_len) else {
+        let what = shortage("IPv4 packet", total_len, packet.len());
+        return match packet.get(header_len..) {
+            Some(beginning) if header[9] == PROTOCOL_UDP && !is_fragment => {
+                cut_udp(from, to, beginning, what)
+            }
+            _ => Packet::Other(what),
+        };
+    };
+    if is_fragment {
+        return Packet::Other("IPv4 fragment, not decoded".to_owned());
+    }
     match header[9] {
         PROTOCOL_UDP => udp(from, to, payload),
         PROTOCOL_TCP => tcp(from, to, payload),
@@ -104,10 +118,17 @@ fn udp(from: Ipv4Addr, to: Ipv4Addr, datagram: &[u8]) -> Packet<'_> {
     let Some(header) = datagram.get(..8) else { return short("UDP header", 8, datagram.len()) };
     let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
     let Some(payload) = datagram.get(8..length) else {
-        return short("UDP datagram", length.max(8), datagram.len());
+        return cut_udp(from, to, datagram, shortage("UDP datagram", length.max(8), datagram.len()));
     };
     let (from, to) = ends(from, to, header);
     Packet::Udp { from, to, payload }
+}
+
+/// A datagram that is shorter than its headers say.
+fn cut_udp(from: Ipv4Addr, to: Ipv4Addr, datagram: &[u8], what: String) -> Packet<'_> {
+    let Some((header, payload)) = datagram.split_at_checked(8) else { return Packet::Other(what) };
+    let (from, to) = ends(from, to, header);
+    Packet::CutUdp { from, to, payload, what }
 }
 
 fn tcp(from: Ipv4Addr, to: Ipv4Addr, segment: &[u8]) -> Packet<'_> {
@@ -132,7 +153,11 @@ fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
 }
 
 fn short(what: &str, expected: usize, found: usize) -> Packet<'static> {
-    Packet::Other(format!("{what}: expected {expected} bytes, found {found}"))
+    Packet::Other(shortage(what, expected, found))
+}
+
+fn shortage(what: &str, expected: usize, found: usize) -> String {
+    format!("{what}: expected {expected} bytes, found {found}")
 }
 
 #[cfg(test)]
@@ -153,7 +178,7 @@ mod tests {
 
     fn other(frame: &[u8]) -> String {
         match parse(frame) {
-            Packet::Other(what) => what,
+            Packet::Other(what) | Packet::CutUdp { what, .. } => what,
             known => panic!("{known:?}"),
         }
     }
@@ -195,6 +220,9 @@ mod tests {
         for length in 0..frame.len() {
             let what = other(&frame[..length]);
             assert!(what.contains("expected") && what.contains("found"), "{length}: {what}");
+            // Behind the ports it is known whose datagram it is.
+            let is_known = matches!(parse(&frame[..length]), Packet::CutUdp { from: A, to: B, .. });
+            assert_eq!(is_known, length >= 42, "{length}");
         }
     }
 

@@ -64,7 +64,7 @@ pub fn recognise(bytes: &[u8]) -> Result<Recognised<'_>, FrameError> {
                 "TCP {from} -> {to}: explicit messages go by `set` and `get`"
             )));
         }
-        Packet::Other(_) => {}
+        Packet::CutUdp { .. } | Packet::Other(_) => {}
     }
     if let Ok(datagram) = Class1Datagram::parse(bytes) {
         return connected(datagram.data);

@@ -125,6 +125,16 @@ pub struct Frame<'a> {
     pub comment: Option<&'a str>,
 }
 
+impl Frame<'_> {
+    /// How much of the frame was not recorded, in words; `None` of a whole one.
+    #[must_use]
+    pub fn cut(&self) -> Option<String> {
+        let original = usize::try_from(self.original_len).unwrap_or(usize::MAX);
+        let missing = original.saturating_sub(self.data.len());
+        (missing > 0).then(|| format!("cut in the recording: {missing} bytes are missing"))
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Endian {
     Little,
@@ -283,6 +293,7 @@ impl<R: Read> Reader<R> {
         Ok(Some(Frame {
             number: self.frames,
             at: Some(KernelTime(seconds * 1_000_000_000 + fraction)),
+            section: 0,
             interface: 0,
             interface_name: None,
             interface_description: None,
@@ -293,7 +304,6 @@ impl<R: Read> Reader<R> {
         }))
     }
 
-            section: 0,
     fn next_pcapng(&mut self) -> Result<Option<Frame<'_>>, ReadError> {
         let Some(packet) = self.next_packet()? else { return Ok(None) };
         let Format::PcapNg { endian, section, interfaces } = &self.format else { return Ok(None) };
@@ -307,6 +317,7 @@ impl<R: Read> Reader<R> {
         Ok(Some(Frame {
             number: self.frames,
             at: packet.units.map(|units| interface.unit.to_time(units)),
+            section: *section,
             interface: packet.interface,
             interface_name: interface.name.as_deref(),
             interface_description: interface.description.as_deref(),
@@ -317,7 +328,6 @@ impl<R: Read> Reader<R> {
         }))
     }
 
-            section: *section,
     /// Reads blocks up to the next one that carries a packet; its body is left in `self.body`.
     fn next_packet(&mut self) -> Result<Option<Packet>, ReadError> {
         let Format::PcapNg { endian, section, interfaces } = &mut self.format else { return Ok(None) };
@@ -331,6 +341,7 @@ impl<R: Read> Reader<R> {
             // The section header's type reads the same in both byte orders.
             if kind == blocks::SECTION {
                 *endian = section_header(&mut self.source, start)?;
+                *section += 1;
                 interfaces.clear();
                 continue;
             }
@@ -341,7 +352,6 @@ impl<R: Read> Reader<R> {
                         offset: start,
                         what: "the number of interfaces",
                         expected: "at most 1024",
-                *section += 1;
                         found: 1025,
                     });
                 }

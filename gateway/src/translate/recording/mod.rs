@@ -7,6 +7,7 @@
 //! | it ends in the middle of a frame | an error behind the last whole frame |
 //! | interfaces of another link type, CAN buses of which nobody says what runs there | an error at their first frame, all are left out |
 //! | frames of a second gateway | the same |
+//! | frames with values of a drive or a device that are cut or cannot be read | an error in place of their translation |
 //! | updates that are missing by their sequence count, a silence | a note |
 //! | time that goes backwards | a note |
 
@@ -18,14 +19,14 @@ use std::net::Ipv4Addr;
 use std::sync::Arc;
 
 use profile_cia402::wire::cob_id;
-use profile_cip::wire::class1::Class1Datagram;
+use profile_cip::wire::class1::{CONNECTION_ID_OFFSET, Class1Datagram};
 use profile_sercos::wire::describe::Names;
 use profile_sercos::wire::header::{Header, Phase};
 
 use self::learnt::Learnt;
 use self::oddities::Oddities;
 use super::entry::{Counts, Entry, Place, Sink};
-use super::{Mark, Node, Recognised, Stage, TranslateError, Translator};
+use super::{Mark, Node, Recognised, Stage, StageAxis, TranslateError, Translator};
 use crate::capture::can::{self, LINK_TYPE_CAN, Record};
 use crate::capture::can_bus::{CanBuses, CanProtocol};
 use crate::capture::reader::{Frame, LINK_TYPE_ETHERNET, ReadError, Reader};
@@ -158,23 +159,35 @@ impl Recording<'_> {
     }
 
     fn can(&mut self, frame: &Frame<'_>, place: Place, sink: Sink<'_>) -> Outcome {
-        let Ok(record) = can::parse(frame.data) else { return Outcome::Nothing };
-        let Record::Frame(content) = &record else { return Outcome::Nothing };
+        let record =
+            frame.cut().map_or_else(|| can::parse(frame.data).map_err(|error| error.to_string()), Err);
+        if matches!(record, Ok(Record::Controller { .. })) {
+            return Outcome::Nothing;
+        }
         let bus = self.buses.find(frame);
         let no_buses = self.config.can.len() + self.config.devicenet.len() == 0;
+        if bus.is_none() && !no_buses {
+            return Outcome::LeftOut(self.oddities.left_out(frame, || {
+                let expected =
+                    "expected a CAN interface of the configuration, which has CANopen and DeviceNet, got";
+                let name = frame
+                    .interface_name
+                    .map_or_else(|| "one without name".to_owned(), |name| format!("`{name}`"));
+                format!("{expected} {name}: all its frames are left out")
+            }));
+        }
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                let number = bus.and_then(|bus| bus.number);
+                return self
+                    .unreadable(frame, error, |axis| axis.sercos().is_none() && axis.may_be_on(number));
+            }
+        };
+        let Record::Frame(content) = &record else { return Outcome::Nothing };
         let translated = match bus {
             Some(bus) if bus.protocol == CanProtocol::Devicenet => {
                 self.translator.devicenet(bus.number, content)
-            }
-            None if !no_buses => {
-                return Outcome::LeftOut(self.oddities.left_out(frame, || {
-                    let expected =
-                        "expected a CAN interface of the configuration, which has CANopen and DeviceNet, got";
-                    let name = frame
-                        .interface_name
-                        .map_or_else(|| "one without name".to_owned(), |name| format!("`{name}`"));
-                    format!("{expected} {name}: all its frames are left out")
-                }));
             }
             // Without CAN buses in the configuration the drives come from data sheets, and those are of CANopen.
             // A SYNC comes each cycle, and has nothing in it to read.
@@ -197,40 +210,77 @@ impl Recording<'_> {
         self.decoder.follow(frame, &packet);
         let wanted = match packet {
             Packet::Sercos => {
-                let is_cyclic =
-                    Header::parse(frame.data).map(|header| header.phase.phase()) == Ok(Phase::CP4);
+                let header = Header::parse(frame.data);
                 self.learnt.sercos(self.translator.stage(), self.decoder.bus(frame));
+                let is_cyclic = header.as_ref().map(|header| header.phase.phase()) == Ok(Phase::CP4);
+                let error = header.err().map(|error| format!("SERCOS III: {error}"));
+                let cut = frame.cut().filter(|_| is_cyclic || error.is_some());
+                if let Some(error) = cut.or(error) {
+                    return self.unreadable(frame, error, |axis| axis.sercos().is_some());
+                }
                 if is_cyclic {
                     self.learn(frame, place, sink);
                 }
                 is_cyclic
             }
-            Packet::Udp { from, to, payload } if is_io(from, to) => match Class1Datagram::parse(payload) {
-                Ok(datagram) => {
-                    let ends = (*from.ip(), *to.ip());
-                    let known = self.decoder.connection(datagram.connection_id, ends.0, ends.1);
-                    // Opened before the recording began: the data tell.
-                    let motion =
-                        known.map_or_else(|| super::recognise(frame.data).is_ok(), |(_, motion)| motion);
-                    if motion {
-                        let target = known.map(|(target, _)| target);
-                        if let Some(why) = self.choose_device(frame, target, ends) {
-                            return Outcome::LeftOut(why);
-                        }
-                        if let Some(note) = self.oddities.sequence(&datagram, ends) {
-                            sink(Entry::note(place, &note, Mark::Note));
-                        }
+            Packet::Udp { from, to, payload } if is_io(from, to) => {
+                let datagram = match Class1Datagram::parse(payload) {
+                    Ok(datagram) => datagram,
+                    Err(error) => return self.unreadable(frame, error.to_string(), |_| true),
+                };
+                let ends = (*from.ip(), *to.ip());
+                let known = self.decoder.connection(datagram.connection_id, ends.0, ends.1);
+                // Opened before the recording began: the data say what they are, or else whose they are.
+                let motion = known.map_or_else(
+                    || {
+                        super::recognise(frame.data).is_ok()
+                            || self.has_motion(ends.0)
+                            || self.has_motion(ends.1)
+                    },
+                    |(_, motion)| motion,
+                );
+                if motion {
+                    let target = known.map(|(target, _)| target);
+                    if let Some(why) = self.choose_device(frame, target, ends) {
+                        return Outcome::LeftOut(why);
                     }
-                    motion
+                    if let Some(note) = self.oddities.sequence(&datagram, ends) {
+                        sink(Entry::note(place, &note, Mark::Note));
+                    }
                 }
-                Err(_) => false,
-            },
+                motion
+            }
+            Packet::CutUdp { from, to, payload, what } if is_io(from, to) => {
+                let id = payload.get(CONNECTION_ID_OFFSET..).and_then(<[u8]>::first_chunk);
+                let known =
+                    id.and_then(|id| self.decoder.connection(u32::from_le_bytes(*id), *from.ip(), *to.ip()));
+                let motion = known.is_none_or(|(_, motion)| motion);
+                return self.unreadable(frame, frame.cut().unwrap_or(what), |_| motion);
+            }
             _ => false,
         };
         if !wanted {
             return Outcome::Nothing;
         }
         Outcome::Translated(format!("frame {}", frame.number), self.translator.frame(frame.data))
+    }
+
+    /// A frame that cannot be read: an error if it may be one of an axis like this, else it is of no interest.
+    fn unreadable(
+        &self,
+        frame: &Frame<'_>,
+        error: String,
+        may_be_of: impl Fn(&StageAxis) -> bool,
+    ) -> Outcome {
+        if !self.translator.stage().axes.iter().any(may_be_of) {
+            return Outcome::Nothing;
+        }
+        Outcome::Translated(format!("frame {}", frame.number), Err(TranslateError::Value(error)))
+    }
+
+    /// Whether a CIP Motion device of the configuration has this address.
+    fn has_motion(&self, address: Ipv4Addr) -> bool {
+        self.config.devices.iter().any(|device| device.listen == address && device.assembly.is_none())
     }
 
     /// Takes an update as one of the device that it goes to or comes from. A device with another address than those of the

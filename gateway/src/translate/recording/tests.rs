@@ -10,6 +10,7 @@ use profile_cip::wire::motion::{
 };
 use profile_generic::can::{Frame as CanFrame, Id};
 use profile_sercos::wire::describe::NoNames;
+use profile_sercos::wire::header::{Channel, Kind, PhaseField, TelegramType};
 
 use super::*;
 use crate::capture::Side;
@@ -94,6 +95,27 @@ fn actual() -> Vec<u8> {
     bytes
 }
 
+/// The file with only the first bytes of packet `number`, counted from 0, recorded.
+fn with_cut(file: &[u8], number: usize, len: u8) -> Vec<u8> {
+    let mut packets = 0;
+    let mut cut = Vec::new();
+    for block in blocks(file) {
+        let is_packet = block[0] == 6;
+        if is_packet && packets == number {
+            // Type, length, interface, time, recorded and original length, data, length again.
+            let size = [28 + len.next_multiple_of(4) + 4, 0, 0, 0];
+            let data = &block[28..28 + usize::from(len.next_multiple_of(4))];
+            cut.extend(
+                [&block[..4], &size, &block[8..20], &[len, 0, 0, 0], &block[24..28], data, &size].concat(),
+            );
+        } else {
+            cut.extend(block);
+        }
+        packets += usize::from(is_packet);
+    }
+    cut
+}
+
 /// Everything that is written of a recording, with the demonstration's configuration.
 fn everything(file: &[u8]) -> (String, Counts) {
     let config = config();
@@ -158,6 +180,61 @@ fn updates_to_the_port_that_a_controller_named_are_translated() {
     let (text, found) = everything(&file.finish().unwrap());
     assert_eq!(found, counts(1, 0, 0), "{text}");
     assert!(text.contains("Axis State: Running"), "{text}");
+}
+
+#[test]
+fn an_update_that_is_cut_in_the_recording_is_an_error() {
+    let mut file = writer();
+    (1..=3).for_each(|count| put(&mut file, u64::from(count) * 2, count, BOX));
+    let file = file.finish().unwrap();
+    let (text, found) = everything(&with_cut(&file, 1, 60));
+    assert!(text.contains("frame 2\n  error: cut in the recording: 30 bytes are missing\n"), "{text}");
+    assert_eq!(found, counts(2, 0, 1), "{text}");
+    // Before the connection ID.
+    assert_eq!(everything(&with_cut(&file, 1, 44)).1, counts(2, 0, 1));
+    // Without the ports nobody knows whose it is.
+    assert_eq!(everything(&with_cut(&file, 1, 36)).1, counts(2, 1, 0));
+}
+
+#[test]
+fn what_cannot_be_read_of_a_device_is_an_error_and_what_others_send_is_passed_over() {
+    let controller = Ipv4Addr::new(10, 0, 0, 1);
+    let ends = |device, port| (SocketAddrV4::new(controller, port), SocketAddrV4::new(device, port));
+    let mut file = writer();
+    put(&mut file, 0, 1, BOX);
+    // No class 1 datagram, and one that has no update in it.
+    put_datagram(&mut file, 1, ends(BOX, IO_PORT), &[2, 0, 2, 0x80, 8, 0, 77, 0]);
+    let mut other = [0; CLASS1_HEADER_LEN + 4];
+    Class1Datagram::emit_header(77, 2, 2, 4, &mut other).unwrap();
+    put_datagram(&mut file, 2, ends(BOX, IO_PORT), &other);
+    // Class 1 data of another device, and another protocol.
+    put_datagram(&mut file, 3, ends(OTHER, IO_PORT), &other);
+    put_datagram(&mut file, 4, ends(BOX, 5353), &other);
+    let file = file.finish().unwrap();
+    let (text, found) = everything(&file);
+    assert_eq!(found, counts(1, 2, 2), "{text}");
+    assert_eq!(everything(&with_cut(&file, 4, 48)).1, counts(1, 2, 2));
+}
+
+#[test]
+fn a_sercos_telegram_that_is_cut_or_has_no_header_is_an_error() {
+    let phase = PhaseField::new(false, 0, Phase::CP4);
+    let telegram = TelegramType::new(Channel::Primary, Kind::Mdt, 0);
+    let header = Header { source: [2, 0, 0, 0, 0, 1], telegram, phase };
+    let mut frame = [0; 60];
+    header.emit(&mut frame).unwrap();
+    let mut wrong = frame;
+    wrong[15] ^= 1;
+    let mut file = Writer::new(Vec::new(), ["north", "sercos port 1", "none"], &[]).unwrap();
+    let south = Side::South(profile_sercos::port::Port::One);
+    for frame in [frame, wrong, frame] {
+        file.frame(south, KernelTime(1_000_000_000), &frame, None).unwrap();
+    }
+    let file = with_cut(&file.finish().unwrap(), 2, 32);
+    let (text, found) = everything(&file);
+    assert!(text.contains("frame 2\n  error: SERCOS III: "), "{text}");
+    assert!(text.contains("frame 3\n  error: cut in the recording: 28 bytes are missing"), "{text}");
+    assert_eq!(found.passed_over, 0, "{text}");
 }
 
 #[test]
@@ -348,6 +425,28 @@ fn the_scaling_that_a_drive_reports_in_the_recording_counts() {
     assert!(said.contains("frame 3: note: the scaling of drive-a is that of the recording"), "{said}");
     assert!(said.contains("position_actual 0.500000000 rev"), "{said}");
     assert_eq!((stand_ins.len(), counts.translated, counts.failed), (0, 2, 0));
+}
+
+#[test]
+fn a_can_record_that_cannot_be_read_is_an_error_where_a_drive_may_be_on_its_bus() {
+    // pcap with link type 227; a TPDO of the drive, and one of which only 9 of its 15 bytes were recorded.
+    let mut file =
+        vec![0xD4, 0xC3, 0xB2, 0xA1, 2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0, 0, 227, 0, 0, 0];
+    let record = [0, 0, 1, 0x81, 7, 0, 0, 0, 0x37, 0x16, 8, 0x50, 0x46, 0, 0];
+    for len in [15, 9] {
+        file.extend([[0; 4], [0; 4], [len, 0, 0, 0], [15, 0, 0, 0]].concat());
+        file.extend(&record[..usize::from(len)]);
+    }
+    let config = Config::parse(CAN_BOX, "can.toml").unwrap();
+    let stage = Arc::new(Stage::rehearse(&config, Mapping::embedded().unwrap()).unwrap());
+    let mut said = String::new();
+    let reader = Reader::new(file.as_slice()).unwrap();
+    let captured = translate_capture(&stage, &config, reader, &NoNames, u64::MAX, &mut |entry| {
+        entry.tree.write(&mut said, 0, RowNames::Keys).unwrap();
+        true
+    });
+    assert_eq!(captured.counts, counts(1, 0, 1), "{said}");
+    assert!(said.contains("frame 2\n  error: cut in the recording: 6 bytes are missing\n"), "{said}");
 }
 
 #[test]
