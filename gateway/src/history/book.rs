@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use profile_cip::device::fault_log::{LogEntry, LogKind};
-use profile_cip::wire::motion::codes::ClearingEvent;
+use profile_cip::wire::motion::codes::{AxisStateCode, ClearingEvent};
 use profile_generic::fault::FaultCause;
 use profile_generic::state::DriveState;
 
@@ -12,7 +12,7 @@ use super::record::{FaultEnd, FaultRecord};
 use crate::engine::notice::Notice;
 use crate::local::installation::Installation;
 use crate::local::protocol::printable;
-use crate::status::BoxStatus;
+use crate::status::{AxisStatus, BoxStatus};
 
 /// Faults that are kept.
 pub(super) const RECORDS_MAX: usize = 1_000;
@@ -22,6 +22,9 @@ const UNSEEN: &str = "not seen: the gateway ended first";
 
 /// What ends a fault whose end no controller's record shows.
 const GONE: &str = "the axis has no fault any more";
+
+/// Looks at the status without a fault after which a controller's record has ended too: a second. The record of its end comes sooner.
+const LOOKS_WITHOUT_FAULT: u32 = 50;
 
 /// The faults of the axes.
 #[derive(Debug, Default)]
@@ -46,6 +49,8 @@ struct Present {
     controller: Option<(LogKind, u8)>,
     /// The published status has shown the fault.
     shown: bool,
+    /// Looks since then that have shown none.
+    looks_without: u32,
 }
 
 impl Book {
@@ -154,15 +159,19 @@ impl Book {
         });
     }
 
-    /// Looks at the published status: what has no record of the controller ends when the axis has no fault any more.
+    /// Looks at the published status: what has no record of the controller ends when the axis has no fault any more, and what has one
+    /// when its end was not recorded for [`LOOKS_WITHOUT_FAULT`].
     pub fn look(&mut self, status: &BoxStatus, time: &str) {
         for known in &mut self.present {
-            let axis = status.configured_axes().get(usize::from(known.axis));
-            known.shown |= axis.is_some_and(|axis| axis.fault.is_some());
+            let Some(axis) = status.configured_axes().get(usize::from(known.axis)) else { continue };
+            let is_faulted =
+                axis.fault.is_some() || (known.controller.is_some() && has_controller_fault(axis));
+            known.shown |= is_faulted;
+            known.looks_without = if known.shown && !is_faulted { known.looks_without + 1 } else { 0 };
         }
         let gone = |known: &Present| {
-            let axis = status.configured_axes().get(usize::from(known.axis));
-            known.shown && known.controller.is_none() && axis.is_some_and(|axis| axis.fault.is_none())
+            let enough = if known.controller.is_some() { LOOKS_WITHOUT_FAULT } else { 1 };
+            known.looks_without >= enough
         };
         if self.present.iter().any(gone) {
             self.end(time, GONE, gone);
@@ -189,7 +198,9 @@ impl Book {
             let oldest = self.records.pop_front().map(|record| record.number);
             self.present.retain(|known| Some(known.number) != oldest);
         }
-        self.present.push(Present { number: self.newest, axis, cause: None, controller: None, shown: false });
+        let (cause, controller) = (None, None);
+        let known = Present { number: self.newest, axis, cause, controller, shown: false, looks_without: 0 };
+        self.present.push(known);
         self.present.len() - 1
     }
 
@@ -215,6 +226,12 @@ impl Book {
     fn record(&self, number: u64) -> Option<&FaultRecord> {
         self.records.iter().rev().find(|record| record.number == number)
     }
+}
+
+/// Whether an axis has a fault that its controller has to reset.
+fn has_controller_fault(axis: &AxisStatus) -> bool {
+    let state = AxisStateCode(axis.cip_axis_state);
+    axis.indicators.minor_fault || [AxisStateCode::ABORTING, AxisStateCode::MAJOR_FAULTED].contains(&state)
 }
 
 #[cfg(test)]
@@ -338,5 +355,31 @@ mod tests {
         book.note(&fault(0, CAUSE), &installation(), "later");
         let newest = book.records().next().expect("the new one");
         assert_eq!((newest.number, newest.is_present(), book.records().count()), (3, true, 3));
+    }
+
+    /// The end of a controller's record may never come.
+    #[test]
+    fn fault_with_a_record_of_the_controller_ends_when_the_axis_shows_none_for_a_second() {
+        let mut book = noted(&[fault(1, CAUSE), logged(1, 10, CAUSE, None)]);
+        let present = |book: &Book| book.records().next().is_some_and(FaultRecord::is_present);
+        let mut status = distinct();
+        let axis = &mut status.axes[1];
+        (axis.cip_axis_state, axis.indicators.minor_fault) = (4, false);
+        let look = |book: &mut Book, status: &BoxStatus, times: u32| {
+            (0..times).for_each(|_| book.look(status, "T9"));
+            present(book)
+        };
+        status.axes[1].fault = None;
+        assert!(look(&mut book, &status, 200), "it is not published yet");
+        status.axes[1].fault = Some(CAUSE);
+        assert!(look(&mut book, &status, 200));
+        status.axes[1].fault = None;
+        assert!(look(&mut book, &status, 10), "the end of the record is under way");
+        status.axes[1].indicators.minor_fault = true;
+        assert!(look(&mut book, &status, 200), "the controller has still to reset it");
+        status.axes[1].indicators.minor_fault = false;
+        assert!(!look(&mut book, &status, 200));
+        let end = book.records().next().and_then(|record| record.end.clone()).expect("an end");
+        assert_eq!((end.time.as_deref(), end.by.as_str()), (Some("T9"), GONE));
     }
 }

@@ -1,7 +1,7 @@
 //! The fault and alarm log that a device keeps for people, beside the records it sends to its controller
 //! (clause 5-2.3.14 leaves its form to the device).
 //!
-//! It outlives connections. The newest [`FAULT_LOG_LEN`] entries are kept; older ones give way, and
+//! It outlives connections. [`FAULT_LOG_LEN`] entries are kept: the oldest one that has ended is replaced first, and
 //! [`FaultLog::total`] reports how many there were.
 
 use arrayvec::ArrayVec;
@@ -97,7 +97,9 @@ impl FaultLog {
         self.total = self.total.wrapping_add(1);
         let entry = LogEntry { number: self.total, ended: None, ..entry };
         if self.entries.is_full() {
-            self.entries.remove(0);
+            // The end of an entry is reported only while the entry is kept.
+            let ended = self.entries.iter().position(|entry| entry.ended.is_some());
+            self.entries.remove(ended.unwrap_or(0));
         }
         self.entries.push(entry);
         self.change(entry);
@@ -170,5 +172,20 @@ mod tests {
         let ends: Vec<_> = log.entries().map(|entry| entry.ended).collect();
         assert_eq!(ends, [Some((ClearingEvent::SHUTDOWN_RESET, 60)), Some((ClearingEvent::FAULT_RESET, 50))]);
         assert_eq!(std::iter::from_fn(|| log.poll()).count(), 4);
+    }
+
+    #[test]
+    fn entry_that_has_not_ended_outlasts_those_that_have() {
+        let mut log = FaultLog::new();
+        log.add(fault(1));
+        for at in 0..64 {
+            log.add(LogEntry { kind: LogKind::Alarm(AlarmType::START_INHIBIT), ..fault(2) });
+            log.end_alarm(AlarmType::START_INHIBIT, 2, ClearingEvent::NONE, at);
+            while log.poll().is_some() {}
+        }
+        log.end_faults(ClearingEvent::FAULT_RESET, 99, |_| true);
+        let end = log.poll().map(|entry| (entry.code, entry.ended));
+        assert_eq!(end, Some((1, Some((ClearingEvent::FAULT_RESET, 99)))));
+        assert_eq!((log.entries().count(), log.total()), (FAULT_LOG_LEN, 65));
     }
 }
