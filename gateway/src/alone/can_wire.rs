@@ -3,7 +3,7 @@
 use profile_generic::can::Frame;
 use profile_generic::time::{DurationNs, MonotonicTime};
 
-use crate::engine::port::{CanInput, CanPort, CanSent};
+use crate::engine::port::{CanInput, CanPort, CanSent, OFF_THE_BUS, UNACKNOWLEDGED};
 
 /// Frames taken in one step at most.
 pub const FRAMES_PER_STEP: usize = 64;
@@ -37,7 +37,7 @@ impl CanWire {
         loop {
             match self.port.receive(now) {
                 Some(CanInput::Frame(frame)) => return Ok(Some(frame)),
-                Some(CanInput::BusOff) => return Err("the interface is off the bus".to_owned()),
+                Some(CanInput::BusOff) => return Err(OFF_THE_BUS.to_owned()),
                 Some(CanInput::Transmitted | CanInput::BusOn) => {}
                 None => return Ok(None),
             }
@@ -59,7 +59,7 @@ impl CanWire {
             let Some((frame, since)) = frame else { return Ok(()) };
             if self.port.send(now, &frame) == CanSent::Full {
                 if now.since(since) > STUCK_MAX {
-                    return Err("no station of the bus acknowledges what is sent".to_owned());
+                    return Err(UNACKNOWLEDGED.to_owned());
                 }
                 (self.held, self.again) = (Some((frame, since)), Some(now + FULL_PAUSE));
                 return Ok(());

@@ -59,6 +59,12 @@ pub enum CanInput {
     BusOn,
 }
 
+/// Message about a work that ends with [`CanInput::BusOff`].
+pub const OFF_THE_BUS: &str = "the interface is off the bus";
+
+/// Message about a work that ends because the transmit queue stays full.
+pub const UNACKNOWLEDGED: &str = "no station of the bus acknowledges what is sent";
+
 /// The result of sending a CAN frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CanSent {

@@ -28,7 +28,7 @@ pub use starter::{hints, starter};
 
 use self::unassigned::Search;
 use super::readable;
-use crate::engine::port::{CanInput, CanPort, CanSent};
+use crate::engine::port::{CanInput, CanPort, CanSent, OFF_THE_BUS, UNACKNOWLEDGED};
 
 /// How long a device may take for an answer: who is there answers within some milliseconds.
 const PATIENCE: DurationNs = DurationNs::from_millis(100);
@@ -223,12 +223,16 @@ impl Scanner {
 
     /// Ends the scan at once; what is found counts. [`Scanner::step`] has still to leave the devices as they were.
     pub fn give_up(&mut self, now: MonotonicTime, why: &str) {
-        if !self.findings.iter().any(|finding| finding == why) {
-            self.findings.push(why.to_owned());
-        }
+        self.note(why);
         self.waiting.clear();
         self.probes.clear();
         self.search.give_up(now);
+    }
+
+    fn note(&mut self, why: &str) {
+        if !self.findings.iter().any(|finding| finding == why) {
+            self.findings.push(why.to_owned());
+        }
     }
 
     /// Does what there is to do; `true` when all have been asked, or the bus is off or takes no frames.
@@ -236,7 +240,10 @@ impl Scanner {
         for _ in 0..FRAMES_PER_STEP {
             match port.receive(now) {
                 Some(CanInput::Frame(frame)) => self.take(now, &frame),
-                Some(CanInput::BusOff) => return true,
+                Some(CanInput::BusOff) => {
+                    self.note(OFF_THE_BUS);
+                    return true;
+                }
                 Some(CanInput::Transmitted | CanInput::BusOn) => {}
                 None => break,
             }
@@ -266,6 +273,9 @@ impl Scanner {
         let over = asked && self.search.run(now);
         self.send(now, port);
         let stuck = self.full_since.is_some_and(|since| now.since(since) > STUCK_MAX);
+        if stuck {
+            self.note(UNACKNOWLEDGED);
+        }
         stuck || over
     }
 

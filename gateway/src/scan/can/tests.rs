@@ -151,7 +151,7 @@ fn nobody_is_nobody() {
     // Not even somebody who acknowledges: the first frames stay in the queue.
     let (found, took) = scan(&[]);
     assert!(took < DurationNs::from_secs(6), "{took}");
-    assert_eq!(text(&found), "0 nodes\n\nno node answers by CANopen; drives on DeviceNet would not\n");
+    assert_eq!(found.findings, ["no station of the bus acknowledges what is sent"]);
     assert_eq!(starter(&found, "can0", None), None);
     assert_eq!(hints(&found), "");
 }
@@ -305,4 +305,39 @@ fn a_bus_that_a_master_leads_is_left_alone() {
         let text = format!("another master is on this bus: it sends {}; nothing was asked", frame.id());
         assert_eq!((found.nodes.len(), found.findings), (0, vec![text]));
     }
+}
+
+/// An interface that goes off the bus once it was asked for the next frame so often.
+struct Broken<'a> {
+    port: &'a mut InProcessCan<DriveNode>,
+    left: u32,
+}
+
+impl CanPort for Broken<'_> {
+    fn receive(&mut self, now: MonotonicTime) -> Option<CanInput> {
+        let frame = self.port.receive(now)?;
+        if self.left == 0 {
+            return Some(CanInput::BusOff);
+        }
+        self.left -= 1;
+        Some(frame)
+    }
+
+    fn send(&mut self, now: MonotonicTime, frame: &Frame) -> CanSent {
+        self.port.send(now, frame)
+    }
+}
+
+#[test]
+fn a_scan_that_breaks_off_says_so() {
+    let (mut port, mut now) = bus(&[(3, 1), (9, 1)], &[]);
+    let mut broken = Broken { port: &mut port, left: 20 };
+    let mut scanner = Scanner::new();
+    while !scanner.step(now, &mut broken) {
+        now = now + DurationNs::from_micros(500);
+    }
+    let found = scanner.finish();
+    assert!(!found.nodes.is_empty() || broken.left == 0);
+    assert_eq!(found.findings, ["the interface is off the bus"]);
+    assert!(text(&found).contains("the interface is off the bus"));
 }
