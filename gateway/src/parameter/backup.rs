@@ -149,7 +149,9 @@ impl Identity {
             let text = |identity: &'a Self| identity.0.get(question.key).map_or("nothing", String::as_str);
             (question.key, text(self), text(other))
         });
-        pairs.filter(|(_, one, other)| one != other).collect()
+        // Earlier versions wrote texts in Latin-1 without a mark.
+        let bare = |text: &'a str| text.strip_prefix("latin1:").unwrap_or(text);
+        pairs.filter(|(_, one, other)| bare(one) != bare(other)).collect()
     }
 }
 

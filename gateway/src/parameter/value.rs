@@ -5,7 +5,7 @@
 //! | a number | `-12.5`, with as many decimals as the drive says; also read: `0x1F`, `0b101` |
 //! | bits of a SERCOS drive | `0b0000000001001010` |
 //! | a list, or an array of an attribute | its items with commas: `S-0-0040,S-0-0051` |
-//! | text | the text |
+//! | text | the text; `latin1:` in front of one that the drive has in Latin-1 instead of UTF-8 |
 //! | what nobody knows the type of | its bytes in the drive's order: `hex:0a000000` |
 //!
 //! Any value can be written as `hex:BYTES`. In front of a value, `u8:` `i16:` and so on say the type of an object that is not known,
@@ -94,8 +94,8 @@ impl Kind {
             Some(("hex", bytes)) => {
                 unhex(bytes).ok_or_else(|| bad(bytes, "bytes of two hexadecimal digits"))?
             }
-            Some(("text", text)) if self == Self::ShortString => short_string_bytes(text)?,
-            Some(("text", text)) => text.as_bytes().to_vec(),
+            Some(("text", text)) => self.text_bytes(text.as_bytes())?,
+            Some(("latin1", text)) => self.text_bytes(&latin_1(text)?)?,
             Some((name, value)) if self == Self::Unknown => {
                 let named = Cia402Type::NAMED.iter().find(|(known, _)| *known == name);
                 let (_, kind) = named.ok_or_else(|| ValueError::Untyped(text.to_owned()))?;
@@ -105,11 +105,16 @@ impl Kind {
                 Self::Sercos(attribute) => operation_bytes(attribute, text)?,
                 Self::Object(kind) => object_bytes(kind, text)?,
                 Self::Array(kind, count) => array_bytes(kind, count, text)?,
-                Self::ShortString => short_string_bytes(text)?,
+                Self::ShortString => self.text_bytes(text.as_bytes())?,
                 Self::Unknown => return Err(ValueError::Untyped(text.to_owned())),
             },
         };
         if bytes.len() > DATA_MAX { Err(ValueError::TooLong) } else { Ok(bytes) }
+    }
+
+    /// The bytes of a value that is a text with these characters.
+    fn text_bytes(self, text: &[u8]) -> Result<Vec<u8>, ValueError> {
+        if self == Self::ShortString { short_string_bytes(text) } else { Ok(text.to_vec()) }
     }
 }
 
@@ -274,9 +279,9 @@ fn short_string(data: &[u8]) -> Option<String> {
     (usize::from(*len) == rest.len()).then(|| text(rest))
 }
 
-fn short_string_bytes(text: &str) -> Result<Vec<u8>, ValueError> {
-    let len = u8::try_from(text.len()).map_err(|_| bad(text, "a text of at most 255 bytes"))?;
-    Ok([&[len], text.as_bytes()].concat())
+fn short_string_bytes(text: &[u8]) -> Result<Vec<u8>, ValueError> {
+    let len = u8::try_from(text.len()).map_err(|_| bad(&letters(text), "a text of at most 255 bytes"))?;
+    Ok([&[len], text].concat())
 }
 
 /// Bytes of a number of this type; `None` for texts and bytes.
@@ -319,15 +324,33 @@ fn float_bytes(text: &str, len: usize) -> Option<Vec<u8>> {
     }
 }
 
-/// Text as drives have it: UTF-8, or else Latin-1; without what fills it up.
+/// Marks in front of a value that say what follows.
+const MARKS: [&str; 3] = ["hex:", "text:", "latin1:"];
+
+/// A text of a drive with the mark that it needs.
 fn text(data: &[u8]) -> String {
+    let text = letters(data);
+    if std::str::from_utf8(data).is_err() {
+        return format!("latin1:{text}");
+    }
+    if MARKS.iter().any(|mark| text.starts_with(mark)) { format!("text:{text}") } else { text }
+}
+
+/// The letters of a text as drives have it: UTF-8, or else Latin-1; without what fills it up.
+#[must_use]
+pub fn letters(data: &[u8]) -> String {
     let end = data.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
     let data = &data[..end];
-    let text = match std::str::from_utf8(data) {
+    match std::str::from_utf8(data) {
         Ok(text) => text.to_owned(),
         Err(_) => data.iter().copied().map(char::from).collect(),
-    };
-    if ["hex:", "text:"].iter().any(|mark| text.starts_with(mark)) { format!("text:{text}") } else { text }
+    }
+}
+
+/// A text in Latin-1.
+fn latin_1(text: &str) -> Result<Vec<u8>, ValueError> {
+    let bytes = text.chars().map(|letter| u8::try_from(u32::from(letter)).ok());
+    bytes.collect::<Option<_>>().ok_or_else(|| bad(text, "a text in Latin-1"))
 }
 
 /// A number in units of its last decimal: 1234 with one decimal is 123.4.
@@ -433,6 +456,10 @@ mod tests {
             (Kind::Array(T::I16, 0), &[0xFF, 0xFF, 1, 0], "-1,1"),
             (Kind::ShortString, b"\x05axis ", "axis "),
             (Kind::ShortString, b"\x06hex:01", "text:hex:01"),
+            (Kind::ShortString, b"\x06Stra\xDFe", "latin1:Stra\u{df}e"),
+            (list(One, Format::Text), b"Gr\xF6\xDFe", "latin1:Gr\u{f6}\u{df}e"),
+            (list(One, Format::Text), "Gr\u{f6}\u{df}e".as_bytes(), "Gr\u{f6}\u{df}e"),
+            (list(One, Format::Text), b"latin1:x", "text:latin1:x"),
             (Kind::Unknown, &[1, 2, 3], "hex:010203"),
         ] {
             assert_eq!(kind.decode(data), text, "{kind:?}");
@@ -449,7 +476,6 @@ mod tests {
         assert_eq!(Kind::Array(Cia402Type::U16, 2).decode(&[1, 0, 2]), "hex:010002");
         assert_eq!(Kind::ShortString.decode(b"\x02abc"), "hex:02616263");
         assert_eq!(Kind::ShortString.decode(&[]), "hex:");
-        assert_eq!(list(ItemLength::One, Format::Text).decode(b"caf\xE9\0\0"), "caf\u{e9}");
         let marked = list(ItemLength::One, Format::Text);
         assert_eq!(marked.encode(&marked.decode(b"hex:01")), Ok(b"hex:01".to_vec()), "not taken for bytes");
     }
@@ -488,7 +514,7 @@ mod tests {
             told(Kind::Unknown, "5").starts_with("the type of the parameter is not known: write it as u16:5")
         );
         assert!(told(Kind::Unknown, "u7:5").starts_with("the type of the parameter"));
-        for text in ["hex:1", "hex:0g", "hex:+1", "hex: 1"] {
+        for text in ["hex:1", "hex:0g", "hex:+1", "hex: 1", "latin1:\u{20ac}"] {
             assert!(whole.encode(text).is_err(), "{text}");
         }
         assert_eq!(told(sercos(Four, Format::Idn, 0), "100"), "`100` is not an IDN such as S-0-0100");

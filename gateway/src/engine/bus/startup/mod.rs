@@ -26,7 +26,7 @@ use crate::engine::direct::{DATA_MAX, DirectFailure};
 use crate::mapping::Cia402Type;
 use crate::parameter::id::Id;
 use crate::parameter::startup::{OnDifference, StartupEntry, StartupValue};
-use crate::parameter::value::{Kind, len};
+use crate::parameter::value::{Kind, len, letters};
 
 /// Bytes that a value may be longer than the one of the list, and still be read.
 const SPARE_LEN: usize = 1_024;
@@ -418,16 +418,15 @@ impl Item {
         }
     }
 
-    /// Whether the drive has the value. Zeros fill up a text.
+    /// Whether the drive has the value. Texts are equal by their letters: drives have them in UTF-8 or in Latin-1, and zeros fill them up.
     fn is_equal(&self) -> bool {
         let is_text = match self.kind() {
             Kind::Sercos(attribute) => attribute.format() == Format::Text,
             Kind::Object(kind) => kind == Cia402Type::VisibleString,
             Kind::Array(..) | Kind::ShortString | Kind::Unknown => false,
         };
-        let bare = |bytes: &[u8]| bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
         let [wanted, found] = [&self.wanted, &self.found];
-        wanted == found || (is_text && wanted[..bare(wanted)] == found[..bare(found)])
+        wanted == found || (is_text && letters(wanted) == letters(found))
     }
 
     fn show(&self, bytes: &[u8]) -> String {

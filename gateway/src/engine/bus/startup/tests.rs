@@ -330,3 +330,18 @@ fn a_list_without_entries_is_done_at_once() {
     run.begin(When::Cp2);
     assert!(run.is_done() && run.next().is_none() && run.take_reports().is_empty());
 }
+
+/// A file of a backup has the text of a drive that it is for, whatever bytes the drive has for its letters.
+#[test]
+fn text_in_latin_1_is_equal_to_the_text_of_the_list() {
+    for text in ["Gr\u{f6}\u{df}e", "latin1:Gr\u{f6}\u{df}e", "hex:4772f6df65"] {
+        let mut drive = Drive::new(&[("S-0-1300.0.5", 0, OPEN)]);
+        let held = drive.of("S-0-1300.0.5");
+        held.attribute = Some(Attribute::new(ItemLength::One, Format::Text).list());
+        held.data = b"Gr\xF6\xDFe".to_vec();
+        let mut run = list(&[("S-0-1300.0.5", text, OnDifference::Refuse)]);
+        assert_eq!(drive.run(&mut run, When::Cp2), None, "{text}");
+        let mut run = list(&[("S-0-1300.0.5", "Gr\u{f6}sse", OnDifference::Refuse)]);
+        assert!(drive.run(&mut run, When::Cp2).is_some(), "another drive");
+    }
+}
