@@ -1,20 +1,21 @@
 //! The server: a bounded number of clients, each answered from the latest status.
+//!
+//! The requests are parsed by `tokio-modbus`; its server is not used, because it ends with all of its clients when one cannot be
+//! accepted.
 
-use std::future::Future;
 use std::io;
 use std::net::SocketAddr;
-use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
 use profile_cip::device::hosts::Hosts;
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::time::{Instant, Sleep, sleep};
-use tokio_modbus::prelude::{ExceptionCode, Request, Response, SlaveRequest};
-use tokio_modbus::server::Service;
-use tokio_modbus::server::tcp::Server;
+use tokio::task::JoinSet;
+use tokio::time::{sleep, timeout};
+use tokio_modbus::bytes::Bytes;
+use tokio_modbus::prelude::{ExceptionCode, Request};
 
 use super::map::{Refusal, registers};
 use super::parameters::Parameters;
@@ -24,8 +25,20 @@ use crate::places::{Place, Places};
 use crate::status::BoxStatus;
 use crate::sys::clock::monotonic_now;
 
-/// A client that has sent nothing for this long gives its place up.
+/// A client that has sent no request for this long gives its place up, and so does one that has not taken an answer.
 const IDLE: Duration = Duration::from_secs(120);
+
+/// How long nobody is accepted after somebody could not be.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Transaction identifier, protocol identifier, length, unit identifier.
+const HEADER_LEN: usize = 7;
+
+/// Longest request behind it.
+const PDU_MAX: usize = 253;
+
+/// Set in the function code of an exception.
+const EXCEPTION: u8 = 0x80;
 
 /// Where the server takes the status from.
 pub trait StatusSource: Send + Sync + 'static {
@@ -94,133 +107,152 @@ impl ModbusServer {
     }
 
     /// Answers clients until the future is dropped. A client above the limit is disconnected at once.
-    ///
-    /// # Errors
-    /// Accepting failed.
-    pub async fn run(self, source: impl StatusSource) -> io::Result<()> {
-        let places = Places::new(usize::from(self.clients_max), self.hosts);
-        let source: Arc<dyn StatusSource> = Arc::new(source);
-        let (idle, parameters, limit) = (self.idle, self.parameters, self.limit);
-        let on_connected = |stream: TcpStream, peer: SocketAddr| {
-            let place = places.take(peer.ip());
-            let (source, parameters, limit) = (Arc::clone(&source), parameters.clone(), Arc::clone(&limit));
-            async move {
-                let place = match place {
-                    Ok(place) => place,
-                    Err(error) => {
-                        if limit.admits(monotonic_now(), LineKind::Modbus, Peer::Host(peer.ip())) {
-                            tracing::warn!(%peer, "Modbus client refused: {error}");
-                        }
-                        return Ok(None);
-                    }
-                };
-                tracing::debug!(%peer, "Modbus client connected");
-                Ok(Some((Registers { source, parameters }, Client::new(stream, place, idle))))
-            }
-        };
-        let on_error = |error: io::Error| tracing::debug!(%error, "Modbus client gone");
-        Server::new(self.listener).serve(&on_connected, on_error).await
+    pub async fn run(self, source: impl StatusSource) {
+        let Self { listener, clients_max, hosts, idle, parameters, limit } = self;
+        let registers = Arc::new(Registers { source: Box::new(source), parameters });
+        let places = Places::new(usize::from(clients_max), hosts);
+        serve(
+            (places, &limit),
+            |context| listener.poll_accept(context),
+            |stream, place| answer(stream, place, Arc::clone(&registers), idle),
+        )
+        .await;
     }
 }
 
-/// Answers one client.
+/// Accepts clients, each of which is served by a task until the future is dropped.
+async fn serve<F: Future<Output = io::Result<()>> + Send + 'static>(
+    (places, limit): (Arc<Places>, &LineLimit),
+    mut accept: impl FnMut(&mut Context<'_>) -> Poll<io::Result<(TcpStream, SocketAddr)>>,
+    client: impl Fn(TcpStream, Place) -> F,
+) {
+    let mut clients = JoinSet::new();
+    let mut is_failing = false;
+    loop {
+        let accepted = tokio::select! {
+            accepted = std::future::poll_fn(&mut accept) => accepted,
+            Some(_) = clients.join_next() => continue,
+        };
+        let (stream, peer) = match accepted {
+            Ok(accepted) => accepted,
+            // The process may have no file descriptor left for now, or the client is gone already.
+            Err(error) => {
+                if !is_failing {
+                    tracing::warn!(%error, "a Modbus client cannot be accepted");
+                }
+                is_failing = true;
+                sleep(ACCEPT_PAUSE).await;
+                continue;
+            }
+        };
+        is_failing = false;
+        match places.take(peer.ip()) {
+            Ok(place) => {
+                tracing::debug!(%peer, "Modbus client connected");
+                let served = client(stream, place);
+                clients.spawn(async move {
+                    if let Err(error) = served.await {
+                        tracing::debug!(%peer, %error, "Modbus client gone");
+                    }
+                });
+            }
+            Err(error) if limit.admits(monotonic_now(), LineKind::Modbus, Peer::Host(peer.ip())) => {
+                tracing::warn!(%peer, "Modbus client refused: {error}");
+            }
+            Err(_) => {}
+        }
+    }
+}
+
+/// Answers the requests of one client, which holds its place meanwhile. It ends with the connection, with what is no request, and when
+/// no whole request comes or an answer is not taken for too long.
+async fn answer(
+    mut stream: TcpStream,
+    _place: Place,
+    registers: Arc<Registers>,
+    idle: Duration,
+) -> io::Result<()> {
+    loop {
+        let ([transaction @ .., unit], pdu) = timeout(idle, request(&mut stream)).await??;
+        let request = Request::try_from(Bytes::from(pdu))?;
+        let function = request.function_code().value();
+        let (function, data) = match registers.answer(request).await {
+            Ok(data) => (function, data),
+            Err(exception) => (function | EXCEPTION, vec![exception.into()]),
+        };
+        // At most 252 bytes of data.
+        let len = u16::try_from(2 + data.len()).map_err(io::Error::other)?;
+        let [high, low] = len.to_be_bytes();
+        let [first, second] = transaction;
+        let head = [first, second, 0, 0, high, low, unit, function];
+        timeout(idle, stream.write_all(&[&head, data.as_slice()].concat())).await??;
+    }
+}
+
+/// Receives a request: its transaction identifier and unit identifier, and its PDU.
+async fn request(stream: &mut TcpStream) -> io::Result<([u8; 3], Vec<u8>)> {
+    let mut header = [0; HEADER_LEN];
+    stream.read_exact(&mut header).await?;
+    let [first, second, protocol @ .., high, low, unit] = header;
+    // The unit identifier counts.
+    let len = usize::from(u16::from_be_bytes([high, low])).checked_sub(1).unwrap_or_default();
+    let malformed = || io::Error::new(io::ErrorKind::InvalidData, "no Modbus TCP header");
+    if !(1..=PDU_MAX).contains(&len) {
+        return Err(malformed());
+    }
+    let mut pdu = vec![0; len];
+    // A connection that is closed with unread data is reset.
+    stream.read_exact(&mut pdu).await?;
+    if protocol != [0; 2] {
+        return Err(malformed());
+    }
+    Ok(([first, second, unit], pdu))
+}
+
+/// Answers requests.
 struct Registers {
-    source: Arc<dyn StatusSource>,
+    source: Box<dyn StatusSource>,
     parameters: Parameters,
 }
 
-impl Service for Registers {
-    type Request = SlaveRequest<'static>;
-    type Response = Response;
-    type Exception = ExceptionCode;
-    type Future = Pin<Box<dyn Future<Output = Result<Response, ExceptionCode>> + Send>>;
+impl Registers {
+    /// What follows the function code in the answer.
+    async fn answer(&self, request: Request<'_>) -> Result<Vec<u8>, ExceptionCode> {
+        match request {
+            Request::ReadInputRegisters(address, count) | Request::ReadHoldingRegisters(address, count) => {
+                let words = self.read(address, count).await?;
+                let bytes = words.iter().flat_map(|word| word.to_be_bytes());
+                let len = u8::try_from(2 * words.len()).map_err(|_| ExceptionCode::IllegalDataValue)?;
+                Ok(std::iter::once(len).chain(bytes).collect())
+            }
+            Request::WriteSingleRegister(address, word) => {
+                self.write(address, &[word]).await?;
+                Ok([address.to_be_bytes(), word.to_be_bytes()].concat())
+            }
+            Request::WriteMultipleRegisters(address, words) => {
+                self.write(address, &words).await?;
+                let count = u16::try_from(words.len()).unwrap_or(u16::MAX);
+                Ok([address.to_be_bytes(), count.to_be_bytes()].concat())
+            }
+            _ => Err(ExceptionCode::IllegalFunction),
+        }
+    }
 
-    fn call(&self, request: Self::Request) -> Self::Future {
-        let (source, parameters) = (Arc::clone(&self.source), self.parameters.clone());
-        let read = async move |address, count| {
-            if parameters.has(address) {
-                return parameters.read(address, count).await;
-            }
-            registers(&source.status(), address, count).map_err(|refusal| match refusal {
-                Refusal::Address => ExceptionCode::IllegalDataAddress,
-                Refusal::Count => ExceptionCode::IllegalDataValue,
-            })
-        };
-        let parameters = self.parameters.clone();
-        let write = async move |address, words: &[u16]| match parameters.has(address) {
-            true => parameters.write(address, words).await,
-            false => Err(ExceptionCode::IllegalFunction),
-        };
-        Box::pin(async move {
-            match request.request {
-                Request::ReadInputRegisters(address, count) => {
-                    read(address, count).await.map(Response::ReadInputRegisters)
-                }
-                Request::ReadHoldingRegisters(address, count) => {
-                    read(address, count).await.map(Response::ReadHoldingRegisters)
-                }
-                Request::WriteSingleRegister(address, word) => {
-                    write(address, &[word]).await.map(|()| Response::WriteSingleRegister(address, word))
-                }
-                Request::WriteMultipleRegisters(address, words) => {
-                    let count = u16::try_from(words.len()).unwrap_or(u16::MAX);
-                    let written = write(address, &words).await;
-                    written.map(|()| Response::WriteMultipleRegisters(address, count))
-                }
-                _ => Err(ExceptionCode::IllegalFunction),
-            }
+    async fn read(&self, address: u16, count: u16) -> Result<Vec<u16>, ExceptionCode> {
+        if self.parameters.has(address) {
+            return self.parameters.read(address, count).await;
+        }
+        registers(&self.source.status(), address, count).map_err(|refusal| match refusal {
+            Refusal::Address => ExceptionCode::IllegalDataAddress,
+            Refusal::Count => ExceptionCode::IllegalDataValue,
         })
     }
-}
 
-/// A client's connection with its place among the clients; it ends when nothing comes for too long.
-struct Client {
-    stream: TcpStream,
-    idle: Duration,
-    deadline: Pin<Box<Sleep>>,
-    _place: Place,
-}
-
-impl Client {
-    fn new(stream: TcpStream, place: Place, idle: Duration) -> Self {
-        Self { stream, idle, deadline: Box::pin(sleep(idle)), _place: place }
-    }
-}
-
-impl AsyncRead for Client {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
-        if read.is_ready() {
-            let deadline = Instant::now() + self.idle;
-            self.deadline.as_mut().reset(deadline);
-            return read;
+    async fn write(&self, address: u16, words: &[u16]) -> Result<(), ExceptionCode> {
+        match self.parameters.has(address) {
+            true => self.parameters.write(address, words).await,
+            false => Err(ExceptionCode::IllegalFunction),
         }
-        match self.deadline.as_mut().poll(context) {
-            Poll::Ready(()) => Poll::Ready(Err(io::ErrorKind::TimedOut.into())),
-            Poll::Pending => Poll::Pending,
-        }
-    }
-}
-
-impl AsyncWrite for Client {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_flush(context)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
     }
 }
 
@@ -229,7 +261,7 @@ mod tests {
     use std::net::Ipv4Addr;
 
     use profile_generic::parameter::Parameter;
-    use tokio::io::AsyncReadExt;
+    use tokio::time::Instant;
     use tokio_modbus::client::{Client as _, Context as Master, Reader as _, Writer as _, tcp};
     use tokio_modbus::slave::SlaveContext as _;
 
@@ -378,8 +410,6 @@ mod tests {
 
     #[tokio::test]
     async fn a_malformed_request_costs_only_its_own_connection() {
-        use tokio::io::AsyncWriteExt;
-
         let (address, _publisher) = start(2, IDLE).await;
         let mut other = connect(address).await;
         let mut bad = TcpStream::connect(address).await.unwrap();
@@ -387,5 +417,65 @@ mod tests {
         bad.write_all(&[0, 1, 0, 1, 0, 6, 1, 4, 0, 0, 0, 1]).await.unwrap();
         assert_eq!(bad.read(&mut [0; 1]).await.unwrap(), 0);
         assert_eq!(other.read_input_registers(0, 1).await.unwrap().unwrap(), [1]);
+    }
+
+    /// A client that asks without end and reads no answer.
+    #[tokio::test]
+    async fn a_client_that_takes_no_answers_loses_its_place() {
+        let (address, _publisher) = start(1, Duration::from_millis(300)).await;
+        let mut deaf = TcpStream::connect(address).await.unwrap();
+        let read_all = [0, 1, 0, 0, 0, 6, 1, 4, 0, 0, 0, 125];
+        let requests = read_all.repeat(512);
+        deaf.write_all(&requests).await.unwrap();
+        let asks = tokio::spawn(async move {
+            while deaf.write_all(&requests).await.is_ok() {}
+            sleep(Duration::from_secs(60)).await;
+            drop(deaf);
+        });
+        let deadline = Instant::now() + Duration::from_secs(20);
+        loop {
+            let mut other = connect(address).await;
+            if let Ok(Ok(values)) = other.read_input_registers(0, 1).await {
+                assert_eq!(values, [1]);
+                break;
+            }
+            assert!(Instant::now() < deadline, "the place stays taken");
+            sleep(Duration::from_millis(50)).await;
+        }
+        asks.abort();
+    }
+
+    #[tokio::test]
+    async fn a_client_that_cannot_be_accepted_ends_neither_the_server_nor_the_others() {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let (_publisher, reader) = latest(distinct());
+        let registers = Arc::new(Registers { source: Box::new(reader), parameters: Parameters::default() });
+        // Every second client is gone before it is accepted.
+        let mut accepted = 0;
+        let accept = move |context: &mut Context<'_>| {
+            let result = listener.poll_accept(context);
+            accepted += u32::from(result.is_ready());
+            match result {
+                Poll::Ready(_) if accepted % 2 == 0 => {
+                    Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()))
+                }
+                other => other,
+            }
+        };
+        tokio::spawn(async move {
+            let limit = LineLimit::default();
+            serve((Places::new(4, Hosts::EVERYBODY), &limit), accept, |stream, place| {
+                answer(stream, place, Arc::clone(&registers), IDLE)
+            })
+            .await;
+        });
+        let mut first = connect(address).await;
+        assert_eq!(first.read_input_registers(0, 1).await.unwrap().unwrap(), [1]);
+        let mut second = TcpStream::connect(address).await.unwrap();
+        assert_eq!(second.read(&mut [0; 1]).await.unwrap_or(0), 0, "not accepted");
+        let mut third = connect(address).await;
+        assert_eq!(third.read_input_registers(0, 1).await.unwrap().unwrap(), [1]);
+        assert_eq!(first.read_input_registers(0, 1).await.unwrap().unwrap(), [1], "connected as before");
     }
 }

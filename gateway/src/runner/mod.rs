@@ -25,7 +25,7 @@ use std::time::{Duration, SystemTime as WallClock};
 use profile_cip::device::config::{AdapterConfig, QosConfig};
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
-use tracing::{info, warn};
+use tracing::info;
 
 use self::cycle::{CycleThread, Ended, Setup};
 use self::devices::{DeviceParts, ServerParts};
@@ -353,12 +353,7 @@ fn serve_modbus(
         .serve(modbus.clients.clone())
         .limit_lines(Arc::clone(limit));
     info!(address = %modbus.listen, "Modbus TCP");
-    let source = status.clone();
-    runtime.spawn(async move {
-        if let Err(error) = server.run(source).await {
-            warn!(%error, "Modbus TCP ended");
-        }
-    });
+    runtime.spawn(server.run(status.clone()));
     Ok(())
 }
 
