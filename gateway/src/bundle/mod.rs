@@ -29,6 +29,7 @@ use crate::local::installation::Installation;
 use crate::local::overview::Overview;
 use crate::recording::{Recording, TakeError};
 use crate::status::BoxStatus;
+use crate::status::pulse::{Pulse, silence};
 use crate::time::source::TimeView;
 
 /// The folder in the archive.
@@ -67,6 +68,8 @@ pub struct Sources {
     pub installation: Installation,
     /// The published status.
     pub status: Reader<BoxStatus>,
+    /// Since when it is the same.
+    pub pulse: Pulse,
     /// System time.
     pub time: TimeView,
     /// What has happened.
@@ -79,7 +82,9 @@ impl Sources {
     /// The whole gateway at this moment.
     #[must_use]
     pub fn overview(&self) -> Overview {
-        Overview::of(&self.installation, &self.status.read(), &self.time.read())
+        let status = self.status.read();
+        let silent = silence(&status, self.pulse.age(&status));
+        Overview { silent, ..Overview::of(&self.installation, &status, &self.time.read()) }
     }
 
     /// The archive. It takes tens of milliseconds.
@@ -188,6 +193,7 @@ pub(crate) mod tests {
             files: Files { configuration: text.to_owned(), findings: String::new() },
             installation: installation(),
             status,
+            pulse: Pulse::default(),
             time: TimeView::of(synchronized()),
             histories: Histories::default(),
             recording: Some(recording(None)),
@@ -240,5 +246,18 @@ pub(crate) mod tests {
         let expected = "[box]\nname = \"press\"\n\n[http]\nlisten = \"127.0.0.1:80\"\nadmin_Token = \"(left out)\"\n\
                         password = \"(left out)\"\nuse = \"(left out)\"\n[log]\nlevel = \"info\"\n# token = \"(left out)\"\n";
         assert_eq!(without_secrets(text), expected);
+    }
+
+    #[test]
+    fn gateway_whose_cycle_thread_stands_is_not_healthy() {
+        let mut status = distinct();
+        status.buses[1].up = true;
+        status.axes[1] = status.axes[0];
+        let (publisher, status) = latest(status);
+        let sources = Sources { status, ..sources() };
+        assert!(sources.overview().is_healthy());
+        std::thread::sleep(std::time::Duration::from_millis(1_100));
+        assert!(!sources.overview().is_healthy(), "nothing was published for a second");
+        drop(publisher);
     }
 }

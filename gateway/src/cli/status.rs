@@ -85,6 +85,9 @@ fn text(overview: &Overview, colours: bool) -> String {
     }
     let s = if overview.connections == 1 { "" } else { "s" };
     let _ = writeln!(out, ", {} controller{s}, up {}", overview.connections, duration(overview.uptime_s));
+    if let Some(silent) = &overview.silent {
+        let _ = writeln!(out, "{}", paint(silent, false));
+    }
 
     let _ = write!(out, "time    {}: {}", time.source, paint(&time.state, time.synchronized));
     if let Some(grandmaster) = &time.grandmaster {
@@ -250,6 +253,7 @@ mod tests {
             name: "cell 4".to_owned(),
             version: "0.1.0".to_owned(),
             state: "running".to_owned(),
+            silent: None,
             sercos_phase: Some(4),
             connections: 1,
             uptime_s: 7_384.2,
@@ -286,6 +290,13 @@ mod tests {
     #[test]
     fn a_person_sees_everything_on_one_screen() {
         insta::assert_snapshot!(text(&overview(), false));
+    }
+
+    #[test]
+    fn a_cycle_thread_that_stands_is_shown() {
+        let silent = "the cycle thread has published nothing for 5 s";
+        let standing = Overview { silent: Some(silent.to_owned()), ..overview() };
+        assert!(text(&standing, false).contains(&format!("\n{silent}\n")));
     }
 
     #[test]

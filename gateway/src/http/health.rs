@@ -1,15 +1,9 @@
 //! Whether the gateway is alive, and whether it is ready.
 
-use std::time::Duration;
-
-use profile_generic::inhibit::Inhibits;
-use profile_generic::state::DriveState;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::local::overview::{Axis, Bus, Overview};
-use crate::status::pulse::silence;
-use crate::status::{BoxState, BoxStatus};
+use crate::local::overview::Overview;
 
 /// The health of a gateway.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -25,48 +19,30 @@ pub struct Health {
 }
 
 impl Health {
-    /// Judges a status that has not changed for `age`.
-    pub(super) fn of(status: &BoxStatus, age: Duration, overview: &Overview) -> Self {
-        let reason = silence(status, age);
-        let mut missing: Vec<String> = reason.clone().into_iter().collect();
-        missing.extend(stage(status.state));
-        missing.extend(overview.buses.iter().filter_map(missing_at_bus));
-        missing.extend(overview.axes.iter().filter_map(missing_at_axis));
+    /// Judges a gateway.
+    pub(super) fn of(overview: &Overview) -> Self {
+        let (reason, missing) = (overview.silent.clone(), overview.missing());
         Self { alive: reason.is_none(), reason, ready: missing.is_empty(), missing }
     }
 }
 
-/// What the state of the whole gateway lacks that no bus lacks.
-fn stage(state: BoxState) -> Option<String> {
-    (state == BoxState::STOPPING).then(|| "the gateway stops".to_owned())
-}
-
-fn missing_at_bus(bus: &Bus) -> Option<String> {
-    let phase = bus.phase.map(|phase| format!(" (CP{phase})")).unwrap_or_default();
-    (!bus.up).then(|| format!("bus {}: not in cyclic operation{phase}", bus.name))
-}
-
-fn missing_at_axis(axis: &Axis) -> Option<String> {
-    let name = &axis.name;
-    if let Some(fault) = &axis.fault {
-        return Some(format!("axis {name}: fault {fault}"));
-    }
-    let no_drive = Inhibits::NAMED.iter().find(|(inhibit, _)| *inhibit == Inhibits::NO_DRIVE);
-    let waits = no_drive.is_some_and(|(_, name)| axis.inhibits.iter().any(|inhibit| inhibit == name));
-    let initialises = axis.state == DriveState::NotReady.name();
-    (waits || initialises).then(|| format!("axis {name}: its drive {} is not commissioned", axis.drive))
-}
-
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
+    use profile_generic::inhibit::Inhibits;
+    use profile_generic::state::DriveState;
+
     use super::super::view::tests::installation;
     use super::*;
+    use crate::status::pulse::silence;
     use crate::status::tests::distinct;
+    use crate::status::{BoxState, BoxStatus};
     use crate::time::status::tests::synchronized;
 
     fn health(status: &BoxStatus, age: u64) -> Health {
-        let overview = Overview::of(&installation(), status, &synchronized());
-        Health::of(status, Duration::from_millis(age), &overview)
+        let silent = silence(status, Duration::from_millis(age));
+        Health::of(&Overview { silent, ..Overview::of(&installation(), status, &synchronized()) })
     }
 
     /// The status of a gateway with nothing wrong.

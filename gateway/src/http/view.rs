@@ -1,7 +1,7 @@
 //! What the server sees of the gateway: the published status, system time, and the names.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Instant, SystemTime};
+use std::time::SystemTime;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -14,7 +14,6 @@ use crate::bundle::Sources;
 use crate::history::{FaultRecord, LogEvent, LogQuery, Selection};
 use crate::local::overview::Overview;
 use crate::local::protocol::unit;
-use crate::status::pulse::Heartbeat;
 
 /// Most lines of the log in an answer: what answers to all connections together take of the memory is bounded.
 pub(super) const HTTP_LINES_MAX: usize = 1_000;
@@ -30,8 +29,6 @@ pub struct View {
     started: SystemTime,
     /// What the charts show. Only the server's thread takes the lock.
     traces: Mutex<Traces>,
-    /// Of the published status. Only the server's thread takes the lock.
-    heartbeat: Mutex<Heartbeat>,
 }
 
 /// What does not change while the gateway runs.
@@ -85,8 +82,7 @@ impl View {
     /// A view of a gateway that has started at `started`.
     #[must_use]
     pub fn new(sources: Arc<Sources>, fixed: Fixed, started: SystemTime) -> Self {
-        let heartbeat = Mutex::new(Heartbeat::new(Instant::now()));
-        Self { sources, fixed, started, traces: Mutex::default(), heartbeat }
+        Self { sources, fixed, started, traces: Mutex::default() }
     }
 
     /// What is shown, and what downloads are made of.
@@ -139,14 +135,10 @@ impl View {
     /// Looks at the gateway.
     #[must_use]
     pub fn look(&self) -> Look {
-        let Sources { installation, status, time, histories, .. } = &*self.sources;
-        let status = status.read();
-        let mut heartbeat = self.heartbeat.lock().unwrap_or_else(PoisonError::into_inner);
-        let age = heartbeat.age(Instant::now(), status.uptime);
-        drop(heartbeat);
-        let overview = Overview::of(installation, &status, &time.read());
+        let Sources { histories, .. } = &*self.sources;
+        let overview = self.sources.overview();
         let history = Newest { log: histories.events.newest(), faults: histories.faults.changes() };
-        Look { health: Health::of(&status, age, &overview), status: overview, history }
+        Look { health: Health::of(&overview), status: overview, history }
     }
 
     /// The faults of an axis, or of all.

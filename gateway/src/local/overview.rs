@@ -1,5 +1,7 @@
 //! The state of the whole gateway as one JSON object: the reply to `box`, and what `axisbridge status` shows.
 
+use std::time::Duration;
+
 use profile_cia402::drive::ErrorCode;
 use profile_cia402::wire::emcy::ErrorRegister;
 use profile_cip::device::visualization;
@@ -7,7 +9,9 @@ use profile_cip::wire::motion::codes::AxisStateCode;
 use profile_generic::can::timing::BitRate;
 use profile_generic::cast::f64_from_i64;
 use profile_generic::image::{CommandSet, FeedbackSet};
+use profile_generic::inhibit::Inhibits;
 use profile_generic::quantity::Torque;
+use profile_generic::state::DriveState;
 use profile_sercos::master::station::Presence;
 use profile_sercos::wire::device_control::Topology;
 use profile_sercos::wire::device_status::{DeviceStatus, InactivePort};
@@ -19,6 +23,7 @@ use super::installation::{Installation, NamedBus, NamedDevice};
 use super::protocol::unit;
 use crate::config::TimeSource;
 use crate::status::lateness::BOUNDS_NS;
+use crate::status::pulse::silence;
 use crate::status::{
     self, AxisStatus, BoxState, BoxStatus, BusDetail, BusStatus, Controller, NodeStatus, PHASE_NONE,
 };
@@ -54,6 +59,9 @@ pub struct Overview {
     pub version: String,
     /// `starting`, `phase_up`, `ready`, `running`, `bus_lost` or `stopping`.
     pub state: String,
+    /// Why the cycle thread is not alive: all else here is as it was then. `null` while it is alive.
+    #[serde(default)]
+    pub silent: Option<String>,
     /// Communication phase of the SERCOS bus, where there is one.
     pub sercos_phase: Option<u8>,
     /// Open CIP Motion connections, and owners of assemblies.
@@ -315,7 +323,7 @@ pub struct Axis {
 }
 
 impl Overview {
-    /// The overview of a status.
+    /// The overview of a status that was published just now.
     #[must_use]
     pub fn of(known: &Installation, status: &BoxStatus, time: &TimeStatus) -> Self {
         let counters = &status.counters;
@@ -327,6 +335,7 @@ impl Overview {
             name: known.name.clone(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             state: status.state.to_string(),
+            silent: silence(status, Duration::ZERO),
             sercos_phase: Some(status.phase).filter(|phase| *phase != PHASE_NONE),
             connections: status.connections,
             uptime_s: f64_from_i64(status.uptime.0) / NANO,
@@ -356,12 +365,40 @@ impl Overview {
         [BoxState::READY, BoxState::RUNNING].iter().any(|state| self.state == state.to_string())
     }
 
-    /// Whether all is well: the buses are up, no axis has a fault, and time is synchronized if there is to be one.
+    /// What is missing, by name: a living cycle thread, a bus in cyclic operation, a commissioned drive, an axis without fault.
+    #[must_use]
+    pub fn missing(&self) -> Vec<String> {
+        let mut missing: Vec<String> = self.silent.iter().cloned().collect();
+        // What the state of the whole gateway lacks that no bus lacks.
+        let stops = self.state == BoxState::STOPPING.to_string();
+        missing.extend(stops.then(|| "the gateway stops".to_owned()));
+        missing.extend(self.buses.iter().filter_map(missing_at_bus));
+        missing.extend(self.axes.iter().filter_map(missing_at_axis));
+        missing
+    }
+
+    /// Whether all is well: nothing is missing, and time is synchronized if there is to be one.
     #[must_use]
     pub fn is_healthy(&self) -> bool {
         let timed = self.time.synchronized || self.time.source == TimeSource::None.name();
-        self.is_up() && timed && self.axes.iter().all(|axis| axis.fault.is_none())
+        self.is_up() && timed && self.missing().is_empty()
     }
+}
+
+fn missing_at_bus(bus: &Bus) -> Option<String> {
+    let phase = bus.phase.map(|phase| format!(" (CP{phase})")).unwrap_or_default();
+    (!bus.up).then(|| format!("bus {}: not in cyclic operation{phase}", bus.name))
+}
+
+fn missing_at_axis(axis: &Axis) -> Option<String> {
+    let name = &axis.name;
+    if let Some(fault) = &axis.fault {
+        return Some(format!("axis {name}: fault {fault}"));
+    }
+    let no_drive = Inhibits::NAMED.iter().find(|(inhibit, _)| *inhibit == Inhibits::NO_DRIVE);
+    let waits = no_drive.is_some_and(|(_, name)| axis.inhibits.iter().any(|inhibit| inhibit == name));
+    let initialises = axis.state == DriveState::NotReady.name();
+    (waits || initialises).then(|| format!("axis {name}: its drive {} is not commissioned", axis.drive))
 }
 
 impl Lateness {
@@ -585,9 +622,10 @@ mod tests {
     }
 
     #[test]
-    fn health_is_buses_up_no_fault_and_time_where_there_is_to_be_one() {
+    fn health_is_everything_there_without_fault_and_time_where_there_is_to_be_one() {
         let mut good = overview();
-        good.axes.iter_mut().for_each(|axis| axis.fault = None);
+        good.buses.iter_mut().for_each(|bus| bus.up = true);
+        good.axes[1] = good.axes[0].clone();
         assert!(good.is_healthy());
         let mut faulted = good.clone();
         faulted.axes[1].fault = Some("over_current".to_owned());
@@ -595,7 +633,12 @@ mod tests {
         let mut untimed = good.clone();
         (untimed.time.synchronized, untimed.time.state) =
             (false, SyncPhase::Uncalibrated(Reason::Offset).to_string());
-        for bad in [&faulted, &down, &untimed] {
+        let silent = Some("the cycle thread has published nothing for 5 s".to_owned());
+        let standing = Overview { silent, ..good.clone() };
+        let (mut missing, mut starting) = (good.clone(), good.clone());
+        missing.axes[1].inhibits = vec!["no_drive".to_owned()];
+        starting.axes[1].state = "not_ready".to_owned();
+        for bad in [&faulted, &down, &untimed, &standing, &missing, &starting] {
             assert!(!bad.is_healthy(), "{bad:?}");
         }
         untimed.time.source = "none".to_owned();

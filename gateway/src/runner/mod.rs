@@ -60,6 +60,7 @@ use crate::recording::{self, ContactDevice, Plan, Recording};
 use crate::settings::Store;
 use crate::simulate::drives::SIMULATED_MAC;
 use crate::status::BoxStatus;
+use crate::status::pulse::Pulse;
 use crate::sys::can_interface::ConfigureError;
 use crate::sys::can_socket;
 use crate::sys::interface_lock::LockError;
@@ -72,6 +73,9 @@ const COMMISSION_INTERVAL: Duration = Duration::from_millis(5);
 
 /// How often notices are taken from the cycle thread.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(20);
+
+/// How often it is looked whether the cycle thread publishes.
+const PULSE_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Records that each tap of a recording to a file can hold: a disk can be slow for a second.
 const CAPTURE_DEPTH: usize = 4_096;
@@ -270,10 +274,13 @@ pub fn start(
         files: extras.files.cloned().unwrap_or_default(),
         installation: Installation::of(config),
         status: status.clone(),
+        pulse: Pulse::default(),
         time: time.view(),
         histories: histories.clone(),
         recording: recording.clone(),
     });
+    let stop_notices = Arc::new(AtomicBool::new(false));
+    runtime.spawn(watch_pulse(Arc::clone(&sources), Arc::clone(&stop_notices)));
     let door = (extras.local.is_some() || config.http.is_some()).then(|| {
         let shared = Shared {
             names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
@@ -295,7 +302,6 @@ pub fn start(
         })
         .transpose()?;
     let socket = extras.local.zip(door).map(|(path, door)| serve_local(path, door, &runtime)).transpose()?;
-    let stop_notices = Arc::new(AtomicBool::new(false));
     let scribe = Scribe::new(Installation::of(config), histories.clone(), status.clone(), limit)
         .with_recording(recording.clone());
     runtime.spawn(scribe.run(notices, Arc::clone(&stop_notices)));
@@ -325,6 +331,15 @@ pub fn start(
         recording,
         _socket: socket,
     })
+}
+
+/// Looks at the published status regularly, so that its age is known to whoever asks once.
+async fn watch_pulse(sources: Arc<Sources>, stop: Arc<AtomicBool>) {
+    let mut interval = tokio::time::interval(PULSE_INTERVAL);
+    while !stop.load(Ordering::Relaxed) {
+        interval.tick().await;
+        sources.pulse.age(&sources.status.read());
+    }
 }
 
 /// The runtime of the servers and of everything else beside the cycle.

@@ -1,5 +1,6 @@
 //! Whether the cycle thread is alive: it publishes its status, and each publication has another uptime.
 
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use profile_generic::time::DurationNs;
@@ -44,6 +45,23 @@ impl Heartbeat {
             *self = Self { uptime, since: now };
         }
         now.saturating_duration_since(self.since)
+    }
+}
+
+/// A [`Heartbeat`] for several who look at the status. The age counts from the first look at it: somebody has to look regularly.
+#[derive(Debug)]
+pub struct Pulse(Mutex<Heartbeat>);
+
+impl Default for Pulse {
+    fn default() -> Self {
+        Self(Mutex::new(Heartbeat::new(Instant::now())))
+    }
+}
+
+impl Pulse {
+    /// For how long this status has been the same.
+    pub fn age(&self, status: &BoxStatus) -> Duration {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).age(Instant::now(), status.uptime)
     }
 }
 
