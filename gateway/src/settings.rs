@@ -18,8 +18,8 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use profile_cip::device::config::{AdapterConfig, QosConfig};
 use profile_cip::device::event::{Event, ResetKind};
@@ -140,6 +140,15 @@ impl Store {
             settings: Mutex::new(settings),
             unsaved: AtomicBool::new(false),
         })
+    }
+
+    /// The settings for another run of the gateway in this process: these for the same file, so that what was set lasts as long as the
+    /// process even without one.
+    ///
+    /// # Errors
+    /// As of [`Store::open`].
+    pub fn reopen(self: &Arc<Self>, path: Option<&Path>) -> Result<Arc<Self>, SettingsError> {
+        if self.path.as_deref() == path { Ok(Arc::clone(self)) } else { Self::open(path).map(Arc::new) }
     }
 
     /// Puts what was set at a device into its configuration.
@@ -265,6 +274,21 @@ mod tests {
         store.note("press", &Event::QosChanged(QOS)).unwrap();
         assert_eq!(applied(&store, "press").0, QOS);
         assert!(!store.is_unsaved());
+    }
+
+    #[test]
+    fn another_run_has_the_same_settings_unless_they_are_in_another_file() {
+        let first = Store::open(None).map(Arc::new).unwrap();
+        first.note("press", &Event::InactivityTimeoutChanged { seconds: 7 }).unwrap();
+        let second = first.reopen(None).unwrap();
+        assert_eq!(applied(&second, "press").1, 7);
+        let path = path("reopened");
+        let third = second.reopen(Some(&path)).unwrap();
+        assert_eq!(applied(&third, "press").1, 120);
+        third.note("press", &Event::InactivityTimeoutChanged { seconds: 8 }).unwrap();
+        assert_eq!(applied(&third.reopen(Some(&path)).unwrap(), "press").1, 8);
+        assert_eq!(applied(&third.reopen(None).unwrap(), "press").1, 120);
+        std::fs::remove_file(&path).unwrap();
     }
 
     #[test]

@@ -12,6 +12,7 @@ use tracing::{error, info, warn};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
+use tracing_subscriber::{Registry, reload};
 
 use super::service_manager::ServiceManager;
 use super::{CliError, RunArguments, has_colours};
@@ -33,7 +34,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     return_large_blocks();
     let (mut good, findings) = read(&arguments.config).map_err(|findings| refusal(&findings))?;
     let events = Arc::new(EventRing::default());
-    log_to_stderr(good.config.log_level, &events);
+    let log = Log::to_stderr(good.config.log_level, &events);
     let in_memory = Histories { events: Arc::clone(&events), ..Histories::default() };
     tell(&findings);
     // They have the texts of all tables, megabytes that would stay in memory while the gateway runs.
@@ -42,21 +43,39 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
     let asked = Asked { stop, hurry, reload: super::signal::reload_on_hang_up()? };
     info!(name = good.config.name, version = env!("CARGO_PKG_VERSION"), "axisbridge starts");
     let manager = RefCell::new(ServiceManager::of_environment(Instant::now()));
+    let mut settings = Store::open(good.config.settings_file.as_deref()).map(Arc::new)?;
+    // What ran before files were read again.
+    let mut before = None;
     let mut number = 1;
     loop {
-        let settings = Arc::new(Store::open(good.config.settings_file.as_deref())?);
+        log.set_level(good.config.log_level);
         let directory = good.config.history_dir.as_deref();
         let histories = directory.map_or_else(|| in_memory.clone(), |path| in_memory.kept_in(path));
         // A pipe takes all runs.
         let of_run = |path: &Path| if path.is_file() { capture_of(path, number) } else { path.to_owned() };
         let capture = arguments.capture.as_deref().map(of_run);
+        number += 1;
         let outputs = Outputs { capture: capture.as_deref(), settings: &settings, histories: &histories };
-        match run_once(&good, arguments, &outputs, &asked, &manager)? {
+        let running = match (start(&good, arguments, &outputs), before.take()) {
+            (Ok(running), _) => running,
+            (Err(error), None) => return Err(error.into()),
+            (Err(error), Some(previous)) => {
+                error!("the gateway cannot start with the new configuration: {error}");
+                warn!("the gateway starts with the configuration that it had before");
+                (good, settings) = previous;
+                continue;
+            }
+        };
+        match run_once(running, &settings, arguments, &asked, &manager)? {
             After::End { rested: true } => return Ok(ExitCode::SUCCESS),
             After::End { rested: false } => return Ok(ExitCode::FAILURE),
-            After::Again(next) => good = next.map_or(good, |next| *next),
+            After::Again(None) => {}
+            After::Again(Some(next)) => {
+                let Next { good: next, settings: of_next } = *next;
+                before =
+                    Some((std::mem::replace(&mut good, next), std::mem::replace(&mut settings, of_next)));
+            }
         }
-        number += 1;
     }
 }
 
@@ -96,6 +115,12 @@ struct Asked {
     reload: Arc<AtomicBool>,
 }
 
+/// Files that were read again, and the settings that they name.
+struct Next {
+    good: Good,
+    settings: Arc<Store>,
+}
+
 /// What comes after a run of the box.
 enum After {
     /// Nothing.
@@ -104,7 +129,7 @@ enum After {
         rested: bool,
     },
     /// Another run, with other files where some were read.
-    Again(Option<Box<Good>>),
+    Again(Option<Box<Next>>),
 }
 
 /// Reads the configuration and its tables, as `check` does.
@@ -138,22 +163,30 @@ fn tell(findings: &Findings) {
     }
 }
 
-/// Runs the box once. What was good stays what is run when files that are read again are not.
-fn run_once(
+/// Starts the box.
+fn start(
     good: &Good,
     arguments: &RunArguments,
     outputs: &Outputs<'_>,
-    asked: &Asked,
-    manager: &RefCell<ServiceManager>,
-) -> Result<After, CliError> {
+) -> Result<runner::RunningBox, runner::StartError> {
     let extras = runner::Extras {
         capture: outputs.capture,
         local: arguments.local.as_deref(),
         histories: Some(outputs.histories),
         files: Some(&good.files),
     };
-    let running = runner::start(&good.config, good.mapping.clone(), extras, outputs.settings)?;
-    let (next, reloads) = attend(&running, arguments, asked, manager)?;
+    runner::start(&good.config, good.mapping.clone(), extras, outputs.settings)
+}
+
+/// Runs the box once. Files that are read again and refused leave it as it is.
+fn run_once(
+    running: runner::RunningBox,
+    settings: &Arc<Store>,
+    arguments: &RunArguments,
+    asked: &Asked,
+    manager: &RefCell<ServiceManager>,
+) -> Result<After, CliError> {
+    let (next, reloads) = attend(&running, settings, arguments, asked, manager)?;
     let stops = asked.stop.load(Ordering::Relaxed);
     info!(
         "axisbridge stops: the axes stop, then the bus goes down; a second signal ends the wait for the axes"
@@ -177,10 +210,11 @@ fn run_once(
 /// Stays with a running gateway until it is to stop or to start again; the files that were read again, and whether they are why.
 fn attend(
     running: &runner::RunningBox,
+    settings: &Arc<Store>,
     arguments: &RunArguments,
     asked: &Asked,
     manager: &RefCell<ServiceManager>,
-) -> Result<(Option<Box<Good>>, bool), CliError> {
+) -> Result<(Option<Box<Next>>, bool), CliError> {
     let mut told = false;
     let mut next = None;
     let mut reloads = false;
@@ -198,7 +232,7 @@ fn attend(
             return Err("the cycle thread has ended by itself; see above".into());
         }
         if asked.reload.swap(false, Ordering::Relaxed) {
-            (next, reloads) = replace(next, reload(&arguments.config), running.has_torque());
+            (next, reloads) = replace(next, reload(&arguments.config, settings), running.has_torque());
         }
     }
     Ok((next, reloads))
@@ -237,21 +271,29 @@ fn replace<T>(before: Option<T>, read: Option<T>, has_torque: bool) -> (Option<T
     (read, starts)
 }
 
-/// Reads the files again; `None` when they are refused.
-fn reload(path: &Path) -> Option<Box<Good>> {
-    match read(path) {
-        Ok((good, findings)) => {
-            info!(file = %path.display(), "configuration and tables were read again, without errors");
-            tell(&findings);
-            Some(Box::new(good))
-        }
+/// Reads the files again, and the settings if they are to be in another file; `None` when they are refused.
+fn reload(path: &Path, settings: &Arc<Store>) -> Option<Box<Next>> {
+    let refused = || warn!("configuration and tables are refused: the gateway keeps the present ones");
+    let (good, findings) = match read(path) {
+        Ok(read) => read,
         Err(findings) => {
             let errors = findings.list().iter().filter(|finding| finding.severity() == Severity::Error);
             errors.for_each(|finding| error!("{finding}"));
-            warn!("configuration and tables are refused: the gateway keeps the present ones");
-            None
+            refused();
+            return None;
         }
-    }
+    };
+    let settings = match Store::reopen(settings, good.config.settings_file.as_deref()) {
+        Ok(settings) => settings,
+        Err(error) => {
+            error!("{error}");
+            refused();
+            return None;
+        }
+    };
+    info!(file = %path.display(), "configuration and tables were read again, without errors");
+    tell(&findings);
+    Some(Box::new(Next { good, settings }))
 }
 
 /// What is logged: what `wanted` says (`debug`, or `info,axisbridge::modbus=trace`), or else the level of the file; and why not what is wanted. The
@@ -293,21 +335,41 @@ fn targets(wanted: &str) -> Result<Targets, String> {
     })
 }
 
-/// Logs to standard error, and into the ring; the environment variable `RUST_LOG` overrides the level of the file.
-fn log_to_stderr(level: LogLevel, ring: &Arc<EventRing>) {
-    let wanted = std::env::var_os("RUST_LOG").map(|wanted| wanted.to_string_lossy().into_owned());
-    let (filter, refused) = filter(level, wanted.as_deref());
-    let lines =
-        tracing_subscriber::fmt::layer().fmt_fields(LinesOf).with_writer(std::io::stderr).with_target(false);
-    // A log file or a journal has no colours.
-    let lines = lines.with_ansi(std::io::stderr().is_terminal());
-    // The filter is that of both, so that the ring has what is logged.
-    let logger =
-        tracing_subscriber::registry().with(filter).with(lines).with(RingLayer::new(Arc::clone(ring)));
-    // Refused only when a logger is set already.
-    let _ = logger.try_init();
-    if let Some(refused) = refused {
-        error!("{refused}");
+/// The log of the process.
+struct Log {
+    filter: reload::Handle<Targets, Registry>,
+    /// The environment variable `RUST_LOG`, which overrides the level of the file.
+    wanted: Option<String>,
+}
+
+impl Log {
+    /// Logs to standard error, and into the ring.
+    fn to_stderr(level: LogLevel, ring: &Arc<EventRing>) -> Self {
+        let wanted = std::env::var_os("RUST_LOG").map(|wanted| wanted.to_string_lossy().into_owned());
+        let (filter, refused) = filter(level, wanted.as_deref());
+        let (filter, handle) = reload::Layer::new(filter);
+        let lines = tracing_subscriber::fmt::layer()
+            .fmt_fields(LinesOf)
+            .with_writer(std::io::stderr)
+            .with_target(false);
+        // A log file or a journal has no colours.
+        let lines = lines.with_ansi(std::io::stderr().is_terminal());
+        // The filter is that of both, so that the ring has what is logged.
+        let logger =
+            tracing_subscriber::registry().with(filter).with(lines).with(RingLayer::new(Arc::clone(ring)));
+        // Refused only when a logger is set already.
+        let _ = logger.try_init();
+        if let Some(refused) = refused {
+            error!("{refused}");
+        }
+        Self { filter: handle, wanted }
+    }
+
+    /// Logs from now on what a file with this level says.
+    fn set_level(&self, level: LogLevel) {
+        let (filter, _) = filter(level, self.wanted.as_deref());
+        // Refused only when the logger was not set.
+        let _ = self.filter.reload(filter);
     }
 }
 

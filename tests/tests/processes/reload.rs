@@ -59,6 +59,80 @@ fn a_refused_reload_leaves_the_box_as_it_was_and_a_good_one_starts_it_anew() {
     assert!(running.terminate(PATIENCE).success());
 }
 
+/// A gateway with its files and its log.
+struct Site {
+    folder: PathBuf,
+    log: PathBuf,
+    running: Running,
+}
+
+impl Site {
+    /// Starts one with this configuration.
+    fn start(name: &str, configuration: &str) -> Self {
+        let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join("box.toml"), configuration).unwrap();
+        let log = folder.join("log");
+        let mut command = Command::new(axisbridge());
+        command.args(["run", "--config"]).arg(folder.join("box.toml"));
+        command.env_remove("RUST_LOG").stdout(Stdio::null()).stderr(fs::File::create(&log).unwrap());
+        let running = Running::start("axisbridge run", &mut command);
+        await_line(&log, 0, "EtherNet/IP");
+        Self { folder, log, running }
+    }
+
+    /// Changes the configuration, and has it read again; what was logged before.
+    fn reload(&mut self, configuration: &str) -> usize {
+        let before = fs::read_to_string(&self.log).unwrap().len();
+        fs::write(self.folder.join("box.toml"), configuration).unwrap();
+        self.running.signal("HUP");
+        before
+    }
+}
+
+/// Files without an error can still not start here: then what ran before goes on.
+#[test]
+fn files_that_cannot_start_bring_the_gateway_back_that_ran_before() {
+    let good = two_axes("127.0.0.171", "");
+    let mut site = Site::start("reload-no-start", &good);
+    // An address of another host.
+    let before = site.reload(&two_axes("192.0.2.1", ""));
+    let text = await_line(&site.log, before, "cannot start with the new configuration");
+    assert!(text[before..].contains("192.0.2.1"), "{text}");
+    let failed = before + text[before..].find("cannot start with the new configuration").unwrap();
+    await_line(&site.log, failed, "EtherNet/IP");
+    assert_eq!(site.running.ended(), None);
+    // Settings that nobody can use: nothing is stopped for them.
+    fs::write(site.folder.join("settings.toml"), "no toml").unwrap();
+    let with = good.replacen("[box]\n", "[box]\nsettings_file = \"settings.toml\"\n", 1);
+    assert_ne!(with, good, "the example has a table [box]");
+    let before = site.reload(&with);
+    let text = await_line(&site.log, before, "are refused: the gateway keeps the present ones");
+    assert!(text[before..].contains("settings.toml"), "{text}");
+    assert!(!text[before..].contains("axisbridge restarts"), "{text}");
+    // And a good one still starts.
+    let before = site.reload(&good);
+    let text = await_line(&site.log, before, "axisbridge restarts");
+    await_line(&site.log, before + text[before..].find("axisbridge restarts").unwrap(), "EtherNet/IP");
+    assert!(site.running.terminate(PATIENCE).success());
+}
+
+#[test]
+fn level_of_the_log_is_that_of_the_configuration_that_runs() {
+    let good = two_axes("127.0.0.172", "");
+    let mut site = Site::start("reload-level", &good);
+    let first = fs::read_to_string(&site.log).unwrap();
+    assert!(!first.contains("DEBUG"), "{first}");
+    let before = site.reload(&good.replacen("level = \"info\"", "level = \"debug\"", 1));
+    let text = await_line(&site.log, before, "axisbridge restarts");
+    await_line(&site.log, before + text[before..].find("axisbridge restarts").unwrap(), "EtherNet/IP");
+    let stream = std::net::TcpStream::connect("127.0.0.172:44818").unwrap();
+    await_line(&site.log, before, "DEBUG");
+    drop(stream);
+    assert!(site.running.terminate(PATIENCE).success());
+}
+
 /// A start with a broken overlay says what is wrong and nothing of the shipped tables.
 #[test]
 fn a_refused_start_shows_what_the_user_has_written_and_nothing_else() {
