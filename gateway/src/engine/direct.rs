@@ -20,6 +20,7 @@ use super::axis::{AxisChannel, Owner};
 use super::bus::{Buses, can, devicenet, sercos};
 use super::local::ClientId;
 use super::north::Exchange;
+use super::sharing::{rescale, sharing};
 use crate::mapping::{Item, Object};
 
 /// Length of the queues of requests and of answers.
@@ -271,7 +272,7 @@ struct Active {
     client: ClientId,
     id: u32,
     axis: usize,
-    /// It was for this access, of so many bytes, that the axes must not be enabled any more.
+    /// It has so many bytes of what decides what the values of the device mean.
     rescales: Option<usize>,
 }
 
@@ -290,7 +291,7 @@ impl DirectNorth {
         exchange: &mut Exchange<'_>,
         buses: &mut Buses,
     ) -> Option<(usize, Item)> {
-        let (now, system) = (exchange.now, exchange.system());
+        let now = (exchange.now, exchange.system());
         let Exchange { ending, ref mut axes, .. } = *exchange;
         // A buffer is freed by who has made it: nothing is taken that cannot be answered.
         if self.answers.is_full() {
@@ -302,7 +303,7 @@ impl DirectNorth {
             if let (Err(failure), Some(len)) = (&result, rescales)
                 && !failure.may_have_written(len)
             {
-                sharing(axis, axes, buses).for_each(|axis| axis.rescale(now, system, false));
+                rescale(now, axis, (axes, buses), false);
             }
             let _ = self.answers.push(DirectAnswer { client, id, result, data });
             return None;
@@ -322,15 +323,11 @@ impl DirectNorth {
         let written = target.item().filter(|_| begun.is_ok() && direction != Direction::Read);
         match begun {
             Ok(()) => {
-                let mut is_first = direction == (Direction::Write { rescales: true });
-                if is_first {
-                    for axis in sharing(axis, axes, buses) {
-                        // What an earlier access has changed is not undone by a refusal of this one.
-                        is_first &= !axis.is_rescaled();
-                        axis.rescale(now, system, true);
-                    }
+                let rescales = direction == (Direction::Write { rescales: true });
+                if rescales {
+                    rescale(now, axis, (axes, buses), true);
                 }
-                self.active = Some(Active { client, id, axis, rescales: is_first.then_some(len) });
+                self.active = Some(Active { client, id, axis, rescales: rescales.then_some(len) });
             }
             Err((failure, data)) => {
                 let _ = self.answers.push(DirectAnswer { client, id, result: Err(failure), data });
@@ -338,16 +335,6 @@ impl DirectNorth {
         }
         written.map(|item| (axis, item))
     }
-}
-
-/// The axes of the device of an axis, that one included.
-fn sharing<'a>(
-    axis: usize,
-    axes: &'a mut [AxisChannel],
-    buses: &'a Buses,
-) -> impl Iterator<Item = &'a mut AxisChannel> {
-    let with_number = axes.iter_mut().enumerate();
-    with_number.filter(move |(other, _)| buses.share_device(axis, *other)).map(|(_, axis)| axis)
 }
 
 /// Why an access is not begun. Reading disturbs nobody.
@@ -369,8 +356,7 @@ fn refusal(
     if axis.south().is_none() {
         return Some(DirectFailure::NoDrive);
     }
-    let sharing = axes.iter().enumerate().filter(|(other, _)| buses.share_device(number, *other));
-    sharing.map(|(_, axis)| axis).find_map(|axis| match axis.owner() {
+    sharing(number, axes, buses).find_map(|(_, axis)| match axis.owner() {
         _ if axis.has_controller() => Some(DirectFailure::Controller),
         Owner::Controller => Some(DirectFailure::Controller),
         Owner::Local => Some(DirectFailure::Held),

@@ -39,6 +39,7 @@ pub mod programs;
 mod publication;
 pub mod registers;
 mod schedule;
+mod sharing;
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -420,10 +421,10 @@ impl Engine {
         let mut exchange = Exchange { now, time, mapping, ending: ending.has_begun, axes, notice };
         if let Some(local) = local {
             local.exchange(&mut exchange);
-            local.parameters(mapping, exchange.axes, buses);
+            local.parameters(&mut exchange, buses);
         }
         if let Some(registers) = registers {
-            registers.exchange(mapping, (exchange.axes, exchange.ending), buses);
+            registers.exchange(&mut exchange, buses);
         }
         if let Some(direct) = direct
             && let Some((axis, item)) = direct.exchange(&mut exchange, buses)
@@ -432,11 +433,11 @@ impl Engine {
         }
         for channel in devices {
             channel.exchange(&mut exchange);
-            channel.attributes(now, mapping, exchange.axes, buses, exchange.notice);
+            channel.attributes(&mut exchange, buses);
         }
         for channel in assemblies {
             channel.exchange(&mut exchange);
-            channel.parameters(mapping, (exchange.axes, exchange.ending), buses);
+            channel.parameters(&mut exchange, buses);
         }
     }
 

@@ -8,10 +8,13 @@
 use arrayvec::ArrayVec;
 use profile_generic::parameter::{Access as When, Parameter};
 use profile_generic::state::Report;
+use profile_generic::time::{MonotonicTime, SystemTime};
 
 use super::access::{Access, AccessFailure, Refusal};
 use super::axis::AxisChannel;
-use super::bus::Answer;
+use super::bus::{Answer, Buses, Purpose};
+use super::north::Exchange;
+use super::sharing::{Rescaling, is_rescaling, sharing};
 use crate::mapping::{Computation, DriveProgram, Fact, Item, Known, Mapping, NoValue, READS_MAX};
 
 /// Accesses under way at the same time, of one axis by a controller or of all axes by another north side.
@@ -100,6 +103,23 @@ pub enum Next {
     Done(Result<i64, ParameterFailure>),
 }
 
+/// What a north side has in a cycle for its accesses.
+pub(super) struct Drives<'a> {
+    /// Now, on the local clock and as system time.
+    pub now: (MonotonicTime, SystemTime),
+    pub mapping: &'a Mapping,
+    pub axes: &'a mut [AxisChannel],
+    pub buses: &'a mut Buses,
+}
+
+impl<'a> Drives<'a> {
+    /// Those of an exchange.
+    pub fn of(exchange: &'a mut Exchange<'_>, buses: &'a mut Buses) -> Self {
+        let now = (exchange.now, exchange.system());
+        Self { now, mapping: exchange.mapping, axes: &mut *exchange.axes, buses }
+    }
+}
+
 /// An access to one parameter.
 #[derive(Debug, Clone)]
 pub struct ParameterJob {
@@ -112,6 +132,7 @@ pub struct ParameterJob {
     asked: Asked,
     /// What the drive was sent, if it lets it be read.
     written: Option<Written>,
+    rescaling: Rescaling,
     result: Option<Result<i64, ParameterFailure>>,
 }
 
@@ -120,11 +141,52 @@ impl ParameterJob {
     #[must_use]
     pub const fn new(parameter: Parameter, wanted: Option<i64>) -> Self {
         let (answers, next, asked) = ([None; READS_MAX], Asked::Nothing, Asked::Nothing);
-        Self { parameter, wanted, answers, next, asked, written: None, result: None }
+        Self {
+            parameter,
+            wanted,
+            answers,
+            next,
+            asked,
+            written: None,
+            rescaling: Rescaling::None,
+            result: None,
+        }
     }
 
-    /// What comes next.
-    pub fn next(&mut self, mapping: &Mapping, axis: &AxisChannel) -> Next {
+    /// Asks the drive of an axis for what comes next; the result when it is over. Nothing is written while an axis of the device is
+    /// taken, which is asked of each with its number.
+    pub(super) fn step(
+        &mut self,
+        drives: &mut Drives<'_>,
+        axis: usize,
+        purpose: Purpose,
+        is_taken: impl Fn(usize, &AxisChannel) -> bool,
+    ) -> Option<Result<i64, ParameterFailure>> {
+        let Drives { now, mapping, ref mut axes, ref mut buses } = *drives;
+        let Some(channel) = axes.get(axis) else { return Some(Err(ParameterFailure::Unanswered)) };
+        // What a controller has set is not written over by what was asked before.
+        let may_write = self.wanted.is_some() && !self.is_written();
+        if may_write && sharing(axis, axes, buses).any(|(number, axis)| is_taken(number, axis)) {
+            return Some(Err(ParameterFailure::Refused));
+        }
+        let has_torque = sharing(axis, axes, buses).any(|(_, axis)| axis.may_have_torque());
+        let over = match self.next(mapping, channel, has_torque) {
+            Next::Wait => None,
+            Next::Done(result) => Some(result),
+            Next::Ask(access) if has_torque && is_rescaling(&access) => Some(Err(ParameterFailure::Torque)),
+            Next::Ask(access) if buses.access(axis, &access, purpose) => {
+                self.rescaling.asked(&access);
+                self.sent();
+                None
+            }
+            Next::Ask(_) => Some(Err(ParameterFailure::Busy)),
+        };
+        self.rescaling.apply(now, axis, (axes, buses));
+        over
+    }
+
+    /// What comes next; with torque not every parameter is written.
+    pub(super) fn next(&mut self, mapping: &Mapping, axis: &AxisChannel, has_torque: bool) -> Next {
         if let Some(result) = self.result {
             return Next::Done(result);
         }
@@ -136,7 +198,7 @@ impl ParameterJob {
             self.next = Asked::ReadBack;
             return Next::Ask(Access::read(written.item));
         }
-        let refused = self.refused(mapping, axis);
+        let refused = self.refused(mapping, has_torque);
         if let Some(failure) = refused.or(is_gone.then_some(ParameterFailure::Unanswered)) {
             self.fail(failure);
             return Next::Done(Err(failure));
@@ -163,12 +225,12 @@ impl ParameterJob {
     }
 
     /// Why the value is not written, by what the tables say of the parameter.
-    fn refused(&self, mapping: &Mapping, axis: &AxisChannel) -> Option<ParameterFailure> {
+    fn refused(&self, mapping: &Mapping, has_torque: bool) -> Option<ParameterFailure> {
         let wanted = self.wanted?;
         let row = mapping.dictionaries.generic.by_number(self.parameter)?;
         match row.access {
             When::Read => Some(ParameterFailure::ReadOnly),
-            When::WriteWhileDisabled if axis.may_have_torque() => Some(ParameterFailure::Torque),
+            When::WriteWhileDisabled if has_torque => Some(ParameterFailure::Torque),
             When::Write | When::WriteWhileDisabled => {
                 let beyond = row.range.is_some_and(|(low, high)| !(low..=high).contains(&wanted));
                 beyond.then_some(ParameterFailure::Value)
@@ -177,8 +239,7 @@ impl ParameterJob {
     }
 
     /// Whether a value may have reached the drive.
-    #[must_use]
-    pub fn is_written(&self) -> bool {
+    fn is_written(&self) -> bool {
         self.asked == Asked::Write || self.written.is_some() || self.result.is_some()
     }
 
@@ -266,7 +327,7 @@ impl ParameterJob {
     }
 
     /// The drive was asked what came next.
-    pub fn sent(&mut self) {
+    pub(super) fn sent(&mut self) {
         self.asked = std::mem::replace(&mut self.next, Asked::Nothing);
     }
 
@@ -277,6 +338,7 @@ impl ParameterJob {
 
     /// Takes the drive's answer.
     pub fn take(&mut self, answer: &Answer, axis: &AxisChannel) {
+        self.rescaling.answered(answer);
         let asked = std::mem::replace(&mut self.asked, Asked::Nothing);
         let data = match &answer.result {
             Ok((data, _)) => data,
@@ -355,24 +417,12 @@ impl<T> ParameterJobs<T> {
     /// Asks drives what comes next, and takes out what is over.
     pub fn advance(
         &mut self,
-        mut next: impl FnMut(&T, &mut ParameterJob) -> Next,
-        mut ask: impl FnMut(&T, &Access) -> bool,
+        mut step: impl FnMut(&T, &mut ParameterJob) -> Option<Result<i64, ParameterFailure>>,
         mut done: impl FnMut(T, Result<i64, ParameterFailure>),
     ) {
         let mut at = 0;
         while let Some((what, job)) = self.0.get_mut(at) {
-            let over = match next(what, job) {
-                Next::Wait => None,
-                Next::Done(result) => Some(result),
-                Next::Ask(access) => match ask(what, &access) {
-                    true => {
-                        job.sent();
-                        None
-                    }
-                    false => Some(Err(ParameterFailure::Busy)),
-                },
-            };
-            match over {
+            match step(what, job) {
                 None => at += 1,
                 Some(result) => {
                     let (what, _) = self.0.remove(at);

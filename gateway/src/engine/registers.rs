@@ -1,5 +1,5 @@
 //! Parameters of drives for a north side that knows registers and moves nothing: reads at any time, and writes while nobody
-//! controls the axis.
+//! controls an axis of the device.
 //!
 //! This runs in the cycle: it does not allocate or wait. Requests come through a bounded queue.
 
@@ -7,8 +7,9 @@ use profile_generic::parameter::Parameter;
 
 use super::axis::{AxisChannel, Owner};
 use super::bus::{Answer, Buses, Purpose};
-use super::parameter::{Next, ParameterFailure, ParameterJob, ParameterJobs};
-use crate::mapping::Mapping;
+use super::north::Exchange;
+use super::parameter::{Drives, ParameterFailure, ParameterJob, ParameterJobs};
+use super::sharing::sharing;
 
 /// Length of the queues of requests and of answers.
 const QUEUE_LEN: usize = 64;
@@ -41,7 +42,8 @@ pub struct RegisterAnswer {
 /// Why a parameter was not read or written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum RegisterFailure {
-    /// A controller is connected to the device of the axis, or local control has the axis.
+    /// A controller is connected to the device of the axis, or local control has the axis, or another axis of the same drive is
+    /// controlled so.
     #[error("the axis is controlled by somebody else")]
     Owned,
     /// The gateway is stopping.
@@ -76,7 +78,6 @@ struct Accessed {
     id: u32,
     axis: usize,
     ticket: u32,
-    write: bool,
 }
 
 /// Whether somebody controls the axis.
@@ -100,27 +101,18 @@ impl RegisterNorth {
     }
 
     /// Takes requests, asks drives for what they need next, and answers those that are over.
-    pub(super) fn exchange(
-        &mut self,
-        mapping: &Mapping,
-        (axes, ending): (&[AxisChannel], bool),
-        buses: &mut Buses,
-    ) {
+    pub(super) fn exchange(&mut self, exchange: &mut Exchange<'_>, buses: &mut Buses) {
         for _ in 0..REQUESTS_PER_CYCLE {
             let Ok(request) = self.requests.pop() else { break };
-            self.begin(request, axes, ending);
+            self.begin(request, (exchange.axes, buses), exchange.ending);
         }
         let Self { jobs, answers, .. } = self;
+        let mut drives = Drives::of(exchange, buses);
         jobs.advance(
-            |what, job| match axes.get(what.axis) {
-                // What a controller has set is not written over by what was asked before.
-                Some(axis) if what.write && is_owned(axis) && !job.is_written() => {
-                    Next::Done(Err(ParameterFailure::Refused))
-                }
-                Some(axis) => job.next(mapping, axis),
-                None => Next::Done(Err(ParameterFailure::Unanswered)),
+            |what, job| {
+                let purpose = Purpose::RegisterParameter(what.ticket);
+                job.step(&mut drives, what.axis, purpose, |_, axis| is_owned(axis))
             },
-            |what, request| buses.access(what.axis, request, Purpose::RegisterParameter(what.ticket)),
             |what, result| {
                 let result = result.map_err(RegisterFailure::Parameter);
                 let _ = answers.push(RegisterAnswer { id: what.id, result });
@@ -128,20 +120,22 @@ impl RegisterNorth {
         );
     }
 
-    fn begin(&mut self, request: RegisterRequest, axes: &[AxisChannel], ending: bool) {
+    fn begin(&mut self, request: RegisterRequest, (axes, buses): (&[AxisChannel], &Buses), ending: bool) {
         let RegisterRequest { id, axis, parameter, wanted } = request;
         let axis = usize::from(axis);
-        let refusal = match axes.get(axis) {
+        let refusal = match wanted {
             _ if ending => Some(RegisterFailure::Ending),
-            None => Some(ParameterFailure::Absent.into()),
-            Some(axis) if wanted.is_some() && is_owned(axis) => Some(RegisterFailure::Owned),
-            Some(_) => None,
+            _ if axis >= axes.len() => Some(ParameterFailure::Absent.into()),
+            Some(_) if sharing(axis, axes, buses).any(|(_, axis)| is_owned(axis)) => {
+                Some(RegisterFailure::Owned)
+            }
+            _ => None,
         };
         if let Some(refusal) = refusal {
             return self.answer(id, Err(refusal));
         }
         self.ticket = self.ticket.wrapping_add(1);
-        let what = Accessed { id, axis, ticket: self.ticket, write: wanted.is_some() };
+        let what = Accessed { id, axis, ticket: self.ticket };
         if !self.jobs.push(what, ParameterJob::new(parameter, wanted)) {
             self.answer(id, Err(ParameterFailure::Busy.into()));
         }

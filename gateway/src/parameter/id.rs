@@ -11,7 +11,7 @@ use std::fmt;
 use profile_sercos::wire::idn::Idn;
 
 use crate::engine::direct::Target;
-use crate::mapping::Object;
+use crate::mapping::{Attribute, Item, Object};
 
 /// The number of a parameter in a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +62,17 @@ impl Id {
             Self::Idn(idn) => Target::Element(idn, profile_sercos::wire::svc::Element::Data),
             Self::Object(object) => Target::Object(object),
             Self::Path { class, instance, attribute } => Target::Attribute { class, instance, attribute },
+        }
+    }
+}
+
+impl From<Item> for Id {
+    fn from(item: Item) -> Self {
+        match item {
+            Item::Idn(idn) => Self::Idn(idn),
+            Item::Object(object) => Self::Object(object),
+            // The instance is the axis itself.
+            Item::Attribute(Attribute { class, id }) => Self::Path { class, instance: 1, attribute: id },
         }
     }
 }

@@ -11,6 +11,7 @@ use profile_cia402::node::dictionary::{self, DataType};
 use profile_cia402::wire::Mux;
 use profile_cip::controller::Step;
 use profile_cip::device::axis_state::AxisState;
+use profile_generic::inhibit::Inhibits;
 use profile_generic::parameter::Parameter;
 use profile_generic::state::DriveState;
 use profile_sercos::slave::parameter::Definition;
@@ -148,14 +149,24 @@ fn a_constant_is_set_only_to_what_it_is() {
 /// The notch filter's frequency by its number.
 const NOTCH_PARAMETER: Parameter = Parameter(0x8001);
 
-/// Reads the parameter of an axis as a client of local control, or writes it.
+/// Reads the notch filter's frequency of an axis as a client of local control, or writes it.
 fn access(
     rig: &mut Rig,
     end: &mut ClientEnd,
-    (client, axis): (u32, u8),
+    of: (u32, u8),
     wanted: Option<i64>,
 ) -> Result<Option<i64>, Failure> {
-    let request = Request::Parameter { client, id: 7, axis, parameter: NOTCH_PARAMETER, wanted };
+    access_of(rig, end, of, (NOTCH_PARAMETER, wanted))
+}
+
+/// Reads a parameter of an axis as a client of local control, or writes it.
+fn access_of(
+    rig: &mut Rig,
+    end: &mut ClientEnd,
+    (client, axis): (u32, u8),
+    (parameter, wanted): (Parameter, Option<i64>),
+) -> Result<Option<i64>, Failure> {
+    let request = Request::Parameter { client, id: 7, axis, parameter, wanted };
     end.requests.push(request).expect("room");
     for _ in 0..5_000 {
         if let Ok(answer) = end.answers.pop() {
@@ -212,9 +223,18 @@ fn a_vendors_parameter_is_read_and_written_by_local_control() {
     assert_eq!(access(&mut rig, &mut end, me, None), Err(Failure::Parameter(ParameterFailure::Unanswered)));
 }
 
-/// Reads the parameter of the first axis as a register, or writes it.
+/// Reads the notch filter's frequency of the first axis as a register, or writes it.
 fn register(rig: &mut Rig, end: &mut RegisterEnd, wanted: Option<i64>) -> Result<i64, RegisterFailure> {
-    let request = RegisterRequest { id: 3, axis: 0, parameter: NOTCH_PARAMETER, wanted };
+    register_of(rig, end, (NOTCH_PARAMETER, wanted))
+}
+
+/// Reads a parameter of the first axis as a register, or writes it.
+fn register_of(
+    rig: &mut Rig,
+    end: &mut RegisterEnd,
+    (parameter, wanted): (Parameter, Option<i64>),
+) -> Result<i64, RegisterFailure> {
+    let request = RegisterRequest { id: 3, axis: 0, parameter, wanted };
     end.requests.push(request).expect("room");
     for _ in 0..5_000 {
         if let Ok(answer) = end.answers.pop() {
@@ -415,4 +435,146 @@ fn a_drive_that_keeps_another_value_is_found_out_by_local_control_and_registers(
         let not_kept = Failure::Parameter(ParameterFailure::NotKept);
         assert_eq!(answer.result, if is_kept { Ok(Some(wanted)) } else { Err(not_kept) });
     }
+}
+
+/// A parameter of the drive that decides what its positions mean, which no table writes.
+const FEED_OVERLAY: &str = r#"
+format = 1
+overlay = "feed of line 4"
+
+[[generic.parameter]]
+number = 0x8003
+name = "feed_turns"
+quantity = "none"
+type = "integer"
+access = "write_while_disabled"
+range = [1, 100]
+about = "Shaft revolutions of the feed."
+
+[[cip-attributes.clauses]]
+source = "Maker"
+clause = "1"
+title = "Attributes of the drives of line 4"
+
+[[cip-attributes.attribute]]
+id = 2_003
+name = "Feed Turns"
+type = "UDINT"
+access = "set"
+need = "------"
+source = "Maker"
+
+[[cip-generic.attribute]]
+attribute = "Feed Turns"
+parameter = "feed_turns"
+missing = "reject"
+source = "Maker"
+
+[[generic-cia402.parameter]]
+parameter = "feed_turns"
+object = "6092:02"
+direction = "both"
+missing = "reject"
+source = "manual of the drive"
+"#;
+const FEED: Parameter = Parameter(0x8003);
+const FEED_ATTRIBUTE: Option<u16> = Some(2003);
+
+/// The clients of local control and of registers on a rig of CANopen drives. The first takes up to 5 shaft revolutions.
+fn with_feed(configuration: &str) -> (Rig, ClientEnd, RegisterEnd) {
+    let settings =
+        Settings { overlays: vec![FEED_OVERLAY], ..Settings::without_line(configuration.to_owned()) };
+    let mut rig = Rig::new(settings);
+    let dictionary = rig.can[0].bus.nodes_mut().next().expect("a device").dictionary_mut();
+    let turns = dictionary.find(Mux::new(0x6092, 2)).expect("the device has it");
+    let definition = dictionary::Definition::new("Shaft revolutions", DataType::U32, 1);
+    dictionary.redefine(turns, definition.range(1, 5));
+    let (local, names) = LocalNorth::new(rig.engine.axes().len());
+    rig.engine.set_local(local);
+    let (registers, numbers) = RegisterNorth::new();
+    rig.engine.set_registers(registers);
+    (rig, names, numbers)
+}
+
+/// Which axes cannot be enabled because the scaling of their drives was changed.
+fn rescaled(rig: &mut Rig) -> Vec<bool> {
+    rig.run_for(millis(100));
+    let inhibits = rig.engine.axes().iter().map(|axis| axis.feedback().inhibits);
+    inhibits.map(|inhibits| inhibits.contains(Inhibits::TRANSFER_ACTIVE)).collect()
+}
+
+/// The program of an axis was made of the scaling that its drive had when it was commissioned.
+#[test]
+fn axis_whose_scaling_was_written_by_name_or_as_a_register_is_not_enabled() {
+    for by_register in [false, true] {
+        let (mut rig, mut names, mut numbers) = with_feed(include_str!("can.toml"));
+        rig.until_ready();
+        rig.run_for(millis(200));
+        let mut write = |rig: &mut Rig, names: &mut ClientEnd, value| {
+            if by_register {
+                let written = register_of(rig, &mut numbers, (FEED, Some(value)));
+                return written.map_err(|failure| format!("{failure}"));
+            }
+            let written = access_of(rig, names, (1, 0), (FEED, Some(value)));
+            written.map(Option::unwrap_or_default).map_err(|failure| format!("{failure}"))
+        };
+        // Beyond the row, and beyond the drive: the scaling is what it was.
+        for refused in [101, 7] {
+            assert!(write(&mut rig, &mut names, refused).is_err(), "{refused}");
+            assert_eq!(rescaled(&mut rig), [false, false], "{refused}");
+        }
+        assert_eq!(write(&mut rig, &mut names, 2), Ok(2));
+        assert_eq!(rescaled(&mut rig), [true, false], "the other axis has another device");
+        // What is refused later undoes nothing.
+        assert!(write(&mut rig, &mut names, 7).is_err());
+        assert_eq!(rescaled(&mut rig), [true, false]);
+        names
+            .requests
+            .push(Request::Order { client: 1, id: 8, axis: 0, order: Order::Enable })
+            .expect("room");
+        for _ in 0..3_000 {
+            rig.run_for(millis(1));
+            assert!(!rig.engine.axes()[0].may_have_torque());
+        }
+        // Commissioned again, with the scaling that it has now.
+        let now = rig.clock().get();
+        rig.can[0].bus.nodes_mut().next().expect("a device").power_cycle(now);
+        rig.run_until(millis(20_000), "the drive", |rig| {
+            let axis = &rig.engine.axes()[0];
+            !axis.feedback().inhibits.contains(Inhibits::TRANSFER_ACTIVE) && axis.south().is_some()
+        });
+    }
+}
+
+/// Both axes of a CANopen device have one drive: whoever controls one of them keeps the parameters of both.
+#[test]
+fn nothing_is_written_by_name_or_as_a_register_while_another_axis_of_the_device_is_controlled() {
+    let configuration = include_str!("can.toml").replace("node = 2", "node = 1\naxis = 1");
+    let (mut rig, mut names, mut numbers) = with_feed(&configuration);
+    rig.until_ready();
+    rig.run_for(millis(200));
+    names.requests.push(Request::Order { client: 2, id: 8, axis: 1, order: Order::Enable }).expect("room");
+    rig.run_until(millis(5_000), "an enabled axis", |rig| {
+        rig.engine.axes()[1].state() == DriveState::Operating
+    });
+    rig.run_for(millis(500));
+    assert_eq!(names.answers.pop().map(|answer| answer.result), Ok(Ok(None)), "enabled");
+    let owned = Err(RegisterFailure::Owned);
+    assert_eq!(register_of(&mut rig, &mut numbers, (FEED, Some(2))), owned);
+    // Not even by the client that has the other axis: that axis has torque.
+    for client in [1, 2] {
+        assert!(access_of(&mut rig, &mut names, (client, 0), (FEED, Some(2))).is_err(), "client {client}");
+    }
+    assert_eq!(register_of(&mut rig, &mut numbers, (FEED, None)), Ok(1), "reading disturbs nobody");
+    assert_eq!(rescaled(&mut rig), [false, false]);
+}
+
+#[test]
+fn axis_whose_scaling_a_controller_has_set_is_not_enabled() {
+    let (rig, _names, _numbers) = with_feed(include_str!("can.toml"));
+    let (mut rig, client) = reached(rig);
+    assert_eq!(client.ask(&mut rig, SET, 1, FEED_ATTRIBUTE, &7_u32.to_le_bytes()).0, INVALID_VALUE);
+    assert_eq!(rescaled(&mut rig), [false, false]);
+    assert_eq!(client.ask(&mut rig, SET, 1, FEED_ATTRIBUTE, &2_u32.to_le_bytes()), OK);
+    assert_eq!(rescaled(&mut rig), [true, false]);
 }

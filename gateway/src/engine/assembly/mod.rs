@@ -34,7 +34,6 @@ use super::bus::{Answer, Buses};
 use super::north::{Exchange, North};
 use super::notice::{Notice, axis_number};
 use super::port::NorthPort;
-use crate::mapping::Mapping;
 use crate::north::DeviceEnd;
 
 /// Explicit requests handled in one cycle.
@@ -216,14 +215,9 @@ impl AssemblyChannel {
     }
 
     /// Reads and writes parameters of the drives for explicit requests.
-    pub(in crate::engine) fn parameters(
-        &mut self,
-        mapping: &Mapping,
-        axes: (&[AxisChannel], bool),
-        buses: &mut Buses,
-    ) {
+    pub(in crate::engine) fn parameters(&mut self, exchange: &mut Exchange<'_>, buses: &mut Buses) {
         let device = (self.number, self.axes.as_slice());
-        self.parameters.exchange(device, axes, (mapping, buses), &mut self.link);
+        self.parameters.exchange(device, exchange, buses, &mut self.link);
     }
 
     /// Takes the drive's answer to such an access.

@@ -16,8 +16,8 @@ use profile_generic::parameter::Parameter;
 use super::PlcAxis;
 use crate::engine::axis::{AxisChannel, Owner};
 use crate::engine::bus::{Answer, Buses, Purpose};
-use crate::engine::parameter::{Next, ParameterFailure, ParameterJob, ParameterJobs};
-use crate::mapping::Mapping;
+use crate::engine::north::Exchange;
+use crate::engine::parameter::{Drives, ParameterJob, ParameterJobs};
 use crate::north::DeviceEnd;
 
 /// Revision of the object.
@@ -54,13 +54,13 @@ impl Parameters {
     pub fn exchange(
         &mut self,
         (device, members): (u8, &[PlcAxis]),
-        (axes, ending): (&[AxisChannel], bool),
-        (mapping, buses): (&Mapping, &mut Buses),
+        exchange: &mut Exchange<'_>,
+        buses: &mut Buses,
         link: &mut DeviceEnd,
     ) {
         while let Some(request) = self.requests.pop_at(0) {
             let token = request.token;
-            let answer = match self.begin(&request, members, axes, ending) {
+            let answer = match self.begin(&request, members, exchange.axes, exchange.ending) {
                 Ok(None) => continue,
                 Ok(Some(number)) => success(token, &number.to_le_bytes()),
                 Err(status) => ExplicitReply::status(token, status.0),
@@ -68,17 +68,16 @@ impl Parameters {
             // A full queue means that the explicit side has given up waiting.
             let _ = link.reply(MotionReply::Explicit(answer));
         }
+        // The adapter lets nobody but an owner of this device write; another one can have the other axes of a drive.
+        let is_taken = |number: usize, axis: &AxisChannel| {
+            let is_own = members.iter().any(|member| member.number == number);
+            axis.owner() == Owner::Local || (!is_own && axis.has_controller())
+        };
+        let mut drives = Drives::of(exchange, buses);
         self.jobs.advance(
-            |what, job| match axes.get(what.axis) {
-                Some(axis) if what.write && axis.owner() == Owner::Local && !job.is_written() => {
-                    Next::Done(Err(ParameterFailure::Refused))
-                }
-                Some(axis) => job.next(mapping, axis),
-                None => Next::Done(Err(ParameterFailure::Unanswered)),
-            },
-            |what, request| {
+            |what, job| {
                 let purpose = Purpose::AssemblyParameter { device, ticket: what.ticket };
-                buses.access(what.axis, request, purpose)
+                job.step(&mut drives, what.axis, purpose, is_taken)
             },
             |what, result| {
                 let answer = match result {

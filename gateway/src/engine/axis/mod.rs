@@ -199,7 +199,7 @@ pub struct AxisChannel {
     captures: CaptureUnit,
     procedure: ProcedureUnit,
     /// Values of the drive mean something else than its program was made of.
-    rescaled: bool,
+    rescaled: u32,
     /// What the configuration has of motor and power stage.
     data: Vec<(Parameter, i64)>,
     /// What is known of the values of the drive that change slowly.
@@ -244,7 +244,7 @@ impl AxisChannel {
             hookup: HookupUnit::default(),
             captures: CaptureUnit::default(),
             procedure: ProcedureUnit::default(),
-            rescaled: false,
+            rescaled: 0,
             data: Vec::new(),
             slow: slow_values::SlowValues::default(),
             nameplate: nameplate::NameplateCheck::default(),
@@ -549,7 +549,7 @@ impl AxisChannel {
         self.link.connect(program);
         self.captures.restart();
         self.drive.action = Action::TorqueOff;
-        self.rescaled = false;
+        self.rescaled = 0;
     }
 
     /// Whether the drive's own fault reset is to be executed, until [`Self::drive_reset_sent`].

@@ -79,7 +79,7 @@ impl AxisChannel {
 
     /// Sets the start inhibits for which the north side is the reason.
     pub fn set_inhibits(&mut self, now: MonotonicTime, system: SystemTime, mut inhibits: Inhibits) {
-        inhibits.set(Inhibits::TRANSFER_ACTIVE, self.rescaled);
+        inhibits.set(Inhibits::TRANSFER_ACTIVE, self.rescaled > 0);
         if let Some(transition) = self.drive.machine.set_inhibits(inhibits) {
             self.follow(now, system, transition);
         }
@@ -90,17 +90,12 @@ impl AxisChannel {
         self.set_points.keep_updates(updates, &self.feedback);
     }
 
-    /// Sets whether a parameter was written that decides what the values of the drive mean: the axis cannot be enabled before its drive
-    /// was commissioned again. Only without torque.
-    pub fn rescale(&mut self, now: MonotonicTime, system: SystemTime, rescaled: bool) {
-        self.rescaled = rescaled;
+    /// A parameter was written that decides what the values of the drive mean: the axis cannot be enabled before its drive was
+    /// commissioned again, unless each such write was taken back because the drive had refused it. Only without torque.
+    pub fn rescale(&mut self, now: MonotonicTime, system: SystemTime, is_written: bool) {
+        let count = self.rescaled;
+        self.rescaled = if is_written { count.saturating_add(1) } else { count.saturating_sub(1) };
         self.set_inhibits(now, system, self.drive.machine.conditions().inhibits);
-    }
-
-    /// Whether such a parameter was written since the drive was commissioned.
-    #[must_use]
-    pub fn is_rescaled(&self) -> bool {
-        self.rescaled
     }
 
     /// Raises a fault: the controller's configuration of this axis cannot be used.

@@ -15,11 +15,12 @@ use super::refusal::refusal;
 use super::scaling::signal_octets;
 use super::stopping_torque::{self, Comparison};
 use crate::engine::access::{Access, Operation};
-use crate::engine::axis::AxisChannel;
+use crate::engine::axis::{AxisChannel, Owner};
 use crate::engine::bus::{Answer, Buses, Purpose};
 use crate::engine::direct::DirectFailure;
 use crate::engine::notice::{Notice, axis_number};
-use crate::engine::parameter::{ParameterJob, ParameterJobs};
+use crate::engine::parameter::{Next, ParameterFailure, ParameterJob, ParameterJobs};
+use crate::engine::sharing::{Rescaling, is_rescaling, sharing};
 use crate::mapping::{
     self, AttributeEntry, AttributeTable, Backing, CipTables, Item, Mapping, MechanicalFact, Number,
     ParameterEntry, ParameterPlace, SequenceAttributes,
@@ -43,6 +44,8 @@ pub(super) struct Accesses {
     originals: Originals,
     /// The programs of the axis at the last look.
     programs: u64,
+    /// A write to what decides what the values of the drive mean.
+    pub rescaling: Rescaling,
     /// What the computed values of cyclic lists need.
     pub cyclic: CyclicValues,
 }
@@ -94,6 +97,8 @@ pub(super) struct Accessed<'a> {
     pub axis_number: usize,
     pub attributes: &'a AttributeTable,
     pub axis: &'a AxisChannel,
+    /// All axes of the gateway.
+    pub axes: &'a [AxisChannel],
 }
 
 impl Accesses {
@@ -159,12 +164,16 @@ impl Accesses {
                 (request, Some(write))
             }
         };
+        if is_rescaling(&request) && on.is_held(buses) {
+            return Err(GeneralStatus::DEVICE_STATE_CONFLICT);
+        }
         let (number, purpose) = (on.axis_number, on.original(false));
         self.follow_program(on.axis);
         if !self.originals.ask_before(&request, |before| buses.access(number, before, purpose)) {
             return Err(on.unasked());
         }
         on.ask(access, &request, write.is_some(), buses)?;
+        self.rescaling.asked(&request);
         self.writes.extend(write);
         Ok(())
     }
@@ -251,20 +260,28 @@ impl Accesses {
         self.give_back(on, buses);
         let purpose = Purpose::Setting(on.number);
         self.cyclic.advance(now, on.axis, |request| buses.access(axis_number, request, purpose));
-        let original = on.original(false);
+        let (original, is_held) = (on.original(false), on.is_held(buses));
         let (device, tables) = (&mut *on.device, &mapping.cip);
-        let originals = &mut self.originals;
-        self.computed.advance(
-            |_, job| job.next(mapping, axis),
-            |what, request| {
+        let Self { originals, rescaling, computed, .. } = self;
+        computed.advance(
+            |what, job| {
+                let request = match job.next(mapping, axis, axis.may_have_torque()) {
+                    Next::Wait => return None,
+                    Next::Done(result) => return Some(result),
+                    Next::Ask(request) if is_held && is_rescaling(&request) => {
+                        return Some(Err(ParameterFailure::Torque));
+                    }
+                    Next::Ask(request) => request,
+                };
                 let Computed { ticket, attribute, write } = *what;
                 let ask = |before: &Access| buses.access(axis_number, before, original);
-                originals.ask_before(request, ask)
-                    && buses.access(
-                        axis_number,
-                        request,
-                        Purpose::Attribute { ticket, device: number, attribute, write },
-                    )
+                let purpose = Purpose::Attribute { ticket, device: number, attribute, write };
+                if !originals.ask_before(&request, ask) || !buses.access(axis_number, &request, purpose) {
+                    return Some(Err(ParameterFailure::Busy));
+                }
+                rescaling.asked(&request);
+                job.sent();
+                None
             },
             |what, result| {
                 let mut bytes = [0; 8];
@@ -412,6 +429,7 @@ impl Accesses {
         tables: &CipTables,
         notice: &mut dyn FnMut(Notice),
     ) {
+        self.rescaling.answered(answer);
         if write && answer.result.is_ok() {
             self.cyclic.written(answer.item, on.axis);
         }
@@ -470,6 +488,12 @@ impl Accessed<'_> {
     /// The purpose of an access to what the drive has by itself.
     fn original(&self, write: bool) -> Purpose {
         Purpose::Original { device: self.number, write }
+    }
+
+    /// Whether an axis of the drive may have torque, or is another one's.
+    fn is_held(&self, buses: &Buses) -> bool {
+        sharing(self.axis_number, self.axes, buses)
+            .any(|(_, axis)| axis.may_have_torque() || axis.owner() == Owner::Local)
     }
 
     fn is_gone(&self) -> bool {

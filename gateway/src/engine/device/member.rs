@@ -97,7 +97,8 @@ impl Member {
     ) -> (Accessed<'a>, &'a mut Accesses) {
         let Self { axis, scaling, accesses, .. } = self;
         let attributes = scaling.attributes();
-        (Accessed { device, number, place, axis_number: *axis, attributes, axis: &axes[*axis] }, accesses)
+        let (axis_number, axis) = (*axis, &axes[*axis]);
+        (Accessed { device, number, place, axis_number, attributes, axis, axes }, accesses)
     }
 
     /// Sets the scaling attributes of a new connection as the configuration of the gateway has them.

@@ -296,14 +296,9 @@ impl DeviceChannel {
     }
 
     /// Carries accesses to attributes that live in the drive, or in its process image, to where they live.
-    pub fn attributes(
-        &mut self,
-        now: MonotonicTime,
-        mapping: &Mapping,
-        axes: &[AxisChannel],
-        buses: &mut Buses,
-        notice: &mut dyn FnMut(Notice),
-    ) {
+    pub fn attributes(&mut self, exchange: &mut Exchange<'_>, buses: &mut Buses) {
+        let now = (exchange.now, exchange.system());
+        let Exchange { mapping, ref mut axes, ref mut notice, .. } = *exchange;
         // A drive that is not heard is not waited for.
         let is_returning =
             self.members.iter().any(|member| member.accesses.is_returning() && axes[member.axis].is_heard());
@@ -313,7 +308,9 @@ impl DeviceChannel {
             let begun = place.ok_or(GeneralStatus::ATTRIBUTE_NOT_SUPPORTED).and_then(|place| {
                 let member = self.members.get_mut(place).ok_or(GeneralStatus::OBJECT_DOES_NOT_EXIST)?;
                 let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-                accesses.begin(&mut on, &access, buses, mapping, notice)
+                accesses.begin(&mut on, &access, buses, mapping, notice)?;
+                member.accesses.rescaling.apply(now, member.axis, (axes, buses));
+                Ok(())
             });
             if let Err(status) = begun {
                 self.device.complete_attribute(access.ticket, Err(status));
@@ -321,7 +318,8 @@ impl DeviceChannel {
         }
         for (place, member) in self.members.iter_mut().enumerate() {
             let (mut on, accesses) = member.accessed((&mut self.device, self.number), place, axes);
-            accesses.advance(now, &mut on, buses, mapping);
+            accesses.advance(now.0, &mut on, buses, mapping);
+            member.accesses.rescaling.apply(now, member.axis, (axes, buses));
         }
     }
 

@@ -26,8 +26,7 @@ use super::axis::AxisChannel;
 use super::bus::{self, Buses, Purpose};
 use super::north::{Exchange, North};
 use super::notice::{Notice, axis_number};
-use super::parameter::{Next, ParameterFailure, ParameterJob, ParameterJobs};
-use crate::mapping::Mapping;
+use super::parameter::{Drives, ParameterFailure, ParameterJob, ParameterJobs};
 
 /// How long an axis moves after a jog order, at most. A client that hangs, or a key that is released, stops the axis.
 pub const JOG_TIME: DurationNs = DurationNs::from_millis(500);
@@ -66,7 +65,6 @@ struct Accessed {
     id: u32,
     axis: usize,
     ticket: u32,
-    write: bool,
 }
 
 impl LocalNorth {
@@ -155,7 +153,7 @@ impl LocalNorth {
     }
 
     /// Begins an access to a parameter, or answers it if it is refused. Reading disturbs nobody; what is written is up to who
-    /// controls the axis.
+    /// controls the axis. The other axes of its device are looked at before the drive is asked.
     fn access(
         &mut self,
         ending: bool,
@@ -172,7 +170,7 @@ impl LocalNorth {
             _ => None,
         };
         self.ticket = self.ticket.wrapping_add(1);
-        let what = Accessed { client, id, axis: number, ticket: self.ticket, write: wanted.is_some() };
+        let what = Accessed { client, id, axis: number, ticket: self.ticket };
         let begun = refusal.map_or(Ok(()), Err).and_then(|()| {
             let has_room = self.parameters.push(what, ParameterJob::new(parameter, wanted));
             has_room.then_some(()).ok_or(Failure::Parameter(ParameterFailure::Busy))
@@ -183,18 +181,17 @@ impl LocalNorth {
     }
 
     /// Asks drives for what accesses to parameters need next, and answers those that are over.
-    pub(super) fn parameters(&mut self, mapping: &Mapping, axes: &[AxisChannel], buses: &mut Buses) {
-        let Self { parameters, answers, .. } = self;
+    pub(super) fn parameters(&mut self, exchange: &mut Exchange<'_>, buses: &mut Buses) {
+        let Self { parameters, answers, axes, .. } = self;
+        let held = |number: usize| axes.get(number).and_then(|local| local.holder);
+        let mut drives = Drives::of(exchange, buses);
         parameters.advance(
-            |what, job| match axes.get(what.axis) {
-                // What a controller has set is not written over by what was asked before.
-                Some(axis) if what.write && axis.has_controller() && !job.is_written() => {
-                    Next::Done(Err(ParameterFailure::Refused))
-                }
-                Some(axis) => job.next(mapping, axis),
-                None => Next::Done(Err(ParameterFailure::Unanswered)),
+            |what, job| {
+                let purpose = Purpose::LocalParameter(what.ticket);
+                job.step(&mut drives, what.axis, purpose, |number, axis| {
+                    axis.has_controller() || held(number).is_some_and(|holder| holder != what.client)
+                })
             },
-            |what, request| buses.access(what.axis, request, Purpose::LocalParameter(what.ticket)),
             |what, result| {
                 let Accessed { client, id, .. } = what;
                 let result = result.map(Some).map_err(Failure::Parameter);
