@@ -964,6 +964,17 @@ fn the_end_of_a_torque_is_a_stop_of_a_drive_without_velocity_control() {
     assert_eq!(plc.rig.engine.axes()[0].fault(), None);
 }
 
+/// A drive that has torque control alone starts in it. The torque that the first run asks for is no change of mode that has to be braked for.
+#[test]
+fn first_run_of_a_drive_with_torque_control_alone_keeps_its_torque() {
+    let mut plc = stopping_with("torque", "20.0", "ramped-decel-and-disable", "modes = [\"torque\"]");
+    pushed(&mut plc, 51, 100);
+    let (status, state, ..) = referred(&plc);
+    assert_eq!((status, state), (0xF4, 4), "forward, at its reference");
+    assert!(plc.speed() > 3 * NANO, "{}", plc.speed());
+    assert_eq!((plc.state(), plc.rig.engine.axes()[0].fault()), (DriveState::Operating, None));
+}
+
 /// In speed control the torque reference is without effect, however large it is; the actual torque is shown all the same.
 #[test]
 fn a_torque_reference_is_without_effect_in_speed_control() {

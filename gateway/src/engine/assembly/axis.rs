@@ -293,7 +293,8 @@ impl PlcAxis {
             (self.last, self.torque) = (None, None);
             // Nobody has set-points until there is another source: the axis holds its position.
             axis.end_set_points();
-            if is_pushed(axis) {
+            // A drive that starts in torque control is in the mode that is asked for.
+            if is_pushed(axis) && self.mode != mode::CYCLIC_TORQUE {
                 self.brake(around, axis);
                 if self.handshake.state() != State::Enabled {
                     return;
