@@ -808,6 +808,41 @@ fn cyclic_velocities_and_torques_are_followed() {
     plc.stays_off();
 }
 
+/// A mode that is asked for amid a movement is refused until the axis stands. Then it is taken, and nothing is refused any more.
+#[test]
+fn refusal_of_a_mode_ends_when_the_mode_is_taken() {
+    for mode in [0, 1, 4, 5] {
+        let mut plc = at_a_velocity("position\", \"velocity\", \"torque", (-1_000, 1_000));
+        plc.velocity(TURN);
+        plc.run_for(600);
+        assert!((plc.speed() - NANO).abs() < NANO / 50, "mode {mode}: {}", plc.speed());
+        plc.velocity(0);
+        plc.set(0, "mode", mode);
+        plc.run_for(20);
+        assert_eq!(plc.refusal(), Refusal::MODE, "mode {mode}");
+        plc.run_for(600);
+        assert_eq!((plc.get(0, "mode"), plc.refusal()), (mode, Refusal::NONE));
+        assert!(plc.is(Status::ENABLED | Status::STANDSTILL), "mode {mode}: {:?}", plc.status());
+        assert!(!plc.is(Status::REFUSED), "mode {mode}: {:?}", plc.status());
+    }
+}
+
+/// Each datagram of a cyclic mode is an order: a good one ends the refusal of a value in one before it.
+#[test]
+fn refusal_of_a_value_ends_with_the_next_good_set_point() {
+    let mut plc = cyclic();
+    // With STOP the value is not followed, and is no fault.
+    plc.word(Control::ENABLE | Control::STOP);
+    plc.set(0, "time_stamp", i64::MIN);
+    plc.run_for(40);
+    assert_eq!(plc.refusal(), Refusal::VALUE);
+    plc.set(0, "time_stamp", 0);
+    plc.word(Control::ENABLE);
+    plc.run_for(40);
+    assert_eq!(plc.refusal(), Refusal::NONE);
+    assert!(plc.is(Status::ENABLED) && !plc.is(Status::FAULT), "{:?}", plc.status());
+}
+
 /// A load that the torque has held does not fall when another mode is asked for: in torque control nothing else would hold it.
 #[test]
 fn an_axis_that_leaves_torque_control_holds_its_position() {

@@ -291,6 +291,9 @@ impl PlcAxis {
             }
             (self.mode, self.source, self.followed) = (output.mode, Source::None, None);
             (self.last, self.torque) = (None, None);
+            if self.refusal == Refusal::MODE {
+                self.refusal = Refusal::NONE;
+            }
             // Nobody has set-points until there is another source: the axis holds its position.
             axis.end_set_points();
             // A drive that starts in torque control is in the mode that is asked for.
@@ -415,6 +418,9 @@ impl PlcAxis {
         self.last = Some(self.handed(axis.instant_of(target), &command));
         self.torque = (selection.mode == OperatingMode::Torque).then_some(command.torque);
         let unusable = u32::from(output.refusal.is_some());
+        if unusable == 0 && self.refusal == Refusal::VALUE {
+            self.refusal = Refusal::NONE;
+        }
         let sequence = self.sequence;
         let points = NorthPoints { command, sequence, target, saturated: 0, unusable, is_counted: false };
         axis.take_set_points(now, system, points);
