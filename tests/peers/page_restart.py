@@ -29,6 +29,12 @@ def main():
             report["mapping"] = browser.value(f"(() => {{ showMapping({LOST}, 'turntable'); return mappingView.table.innerText; }})()")
             browser.value("window.location.hash = '#/axis/turntable'")
             browser.until(f"{LIMITS}.includes('10.000 rev/s')", "the limits")
+            browser.until("axisView.samples.lists !== null", "the last minute")
+            # A torque and a velocity that no telegram has.
+            report["absent"] = browser.value(
+                "(() => { const { lists } = axisView.samples; const kept = { ...lists }; lists.torque = [null]; lists.velocity = [null];"
+                " showAxisValues(last.status.axes[0]); Object.assign(lists, kept); const text = axisView.values.innerText;"
+                " showAxisValues(last.status.axes[0]); return text; })()")
             report["values"], report["limits"] = browser.value(
                 f"(() => {{ showAxis({LOST}, 'turntable'); return [axisView.values.innerText, axisView.limits.innerText]; }})()")
             report["before"] = browser.value(VELOCITY)

@@ -100,6 +100,10 @@ fn page_begins_anew_after_a_restart_and_shows_what_a_lost_drive_has_reported_las
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let report: Value = serde_json::from_slice(&output.stdout).expect("one object");
         assert_eq!((&report["before"], &report["after"]), (&"1".into(), &"1.2".into()));
+        let absent = report["absent"].as_str().expect("a text");
+        for name in ["Torque", "Velocity"] {
+            assert!(absent.contains(&format!("{name}\nnot reported")), "{absent}");
+        }
         let count = |key: &str| report[key].as_str().map(|text| text.matches("last reported").count());
         assert!(count("values") >= Some(4), "{report}");
         assert_eq!(count("limits"), Some(1), "{report}");

@@ -15,7 +15,7 @@
 use profile_cip::assembly::handshake::{Axis, Control, Handshake, Reaction, State, Status};
 use profile_cip::assembly::{AxisInput, AxisOutput, Link, Refusal, Scale};
 use profile_generic::fault::FaultCause;
-use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet, StatusBits};
+use profile_generic::image::{AxisCommand, CommandSet, FeedbackSet, Signal, StatusBits};
 use profile_generic::inhibit::Inhibits;
 use profile_generic::interpolation::TargetUpdate;
 use profile_generic::mode::{InterpolationSource, ModeSelection, OperatingMode};
@@ -555,9 +555,10 @@ impl PlcAxis {
             if known && around.synchronized { around.time.system_at(feedback.at) } else { SystemTime(0) };
         let at_reference = match (&self.source, self.followed) {
             (Source::Generator(generator), Some((velocity, _))) => generator.profile.velocity() == velocity,
-            (Source::Cyclic, _) => {
-                self.torque.is_some_and(|torque| feedback.torque.get().abs_diff(torque.get()) <= AT_TORQUE)
-            }
+            (Source::Cyclic, _) => self
+                .torque
+                .zip(feedback.get(Signal::TorqueActual))
+                .is_some_and(|(wanted, actual)| actual.abs_diff(wanted.get()) <= AT_TORQUE),
             _ => false,
         };
         AxisInput {
@@ -636,4 +637,29 @@ fn is_pushed(axis: &AxisChannel) -> bool {
 
 fn is_faulted(axis: &AxisChannel) -> bool {
     axis.fault().is_some() || matches!(axis.state(), DriveState::Faulted | DriveState::FaultReaction)
+}
+
+#[cfg(test)]
+mod tests {
+    use profile_generic::fault::Reaction as FaultReaction;
+    use profile_generic::time_base::TimeSample;
+
+    use super::*;
+    use crate::engine::axis::Limits;
+
+    /// However small the torque is that is wanted: nobody knows whether it is there.
+    #[test]
+    fn torque_that_the_drive_does_not_report_is_not_at_its_reference() {
+        let scale = Scale { counts_per_unit: 1, rated_torque: 0 };
+        let config = AssemblyAxis { axis: 0, instance: 1, scale, stops: StopSettings::default() };
+        let mut plc = PlcAxis::new(&config);
+        (plc.source, plc.torque) = (Source::Cyclic, Some(Torque::ZERO));
+        let now = (MonotonicTime::ZERO, SystemTime(0));
+        let time = TimeBase::new(TimeSample { at: now.0, system: now.1, rate_ppb: 0 });
+        let around =
+            Around { now, time: &time, synchronized: false, link: Link::Run, period: None, paced_at: None };
+        let axis = AxisChannel::new(Limits::default(), FaultReaction::HoldPosition, true);
+        assert_eq!(axis.feedback().get(Signal::TorqueActual), None);
+        assert!(!plc.input(&around, &axis).at_reference);
+    }
 }

@@ -41,6 +41,7 @@ function buildAxis(name) {
     values: section(view, 'axis-values', 'Values').appendChild(element('dl')),
     limits: section(view, 'axis-limits', 'Limits').appendChild(element('dl')),
     samples: new Samples(`/api/v1/traces?axis=${name}&`, MINUTE / SAMPLE),
+    reported: {},
     sheet: null,
     seen: null,
   });
@@ -102,25 +103,26 @@ function drawAxis(unit) {
 
 const optional = (value, digits, unit) => (value === null || value === undefined ? 'none' : number(value, digits, unit));
 
-// Whether the telegram of the drive has had this value last.
-function isReported(key) {
+// Whether the telegram of the drive has had this value last; of a drive that is not heard, before it was lost.
+function isReported(axis, key) {
   const values = axisView.samples.lists ? axisView.samples.lists[key] : [];
-  return values.length === 0 || values[values.length - 1] !== null;
+  if (values.length > 0 && !isOld(axis)) axisView.reported[key] = values[values.length - 1] !== null;
+  return axisView.reported[key] !== false;
 }
 
 function showAxisValues(axis) {
   const { unit } = axis;
   const [tone, more] = isOld(axis) ? ['old', ', last reported'] : ['', ''];
   const reported = (name, text) => [name, `${text}${more}`, tone];
+  const ifReported = (key, name, text) => (isReported(axis, key) ? reported(name, text) : [name, 'not reported']);
   const pairs = [
     reported('Position', number(axis.position, 6, unit)),
     ['Position command', optional(axis.position_command, 6, unit)],
-    reported('Velocity', number(axis.velocity, 6, `${unit}/s`)),
+    ifReported('velocity', 'Velocity', number(axis.velocity, 6, `${unit}/s`)),
     ['Velocity command', optional(axis.velocity_command, 6, `${unit}/s`)],
-    reported('Torque', number(axis.torque, 1, '%')),
+    ifReported('torque', 'Torque', number(axis.torque, 1, '%')),
     ['Torque command', optional(axis.torque_command, 1, '%')],
-    isReported('following_error') ? reported('Following error', number(axis.following_error, 6, unit))
-      : ['Following error', 'not reported'],
+    ifReported('following_error', 'Following error', number(axis.following_error, 6, unit)),
   ];
   if (axis.current !== null) pairs.push(reported('Current', number(axis.current, 2, 'A')));
   if (axis.bus_voltage !== null) pairs.push(reported('DC bus', number(axis.bus_voltage, 1, 'V')));
