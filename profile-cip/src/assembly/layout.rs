@@ -1,6 +1,7 @@
 //! Layouts: which fields an axis has in the assemblies of its device.
 
 use core::fmt;
+use core::ops::Range;
 
 use super::RUN_IDLE_LEN;
 use super::field::{InputField, OutputField};
@@ -373,6 +374,12 @@ impl Assemblies {
             }
             Layout::Speed { output, .. } => place(1, with_torque(&SPEED_OUTPUT, *output)),
         }
+    }
+
+    /// The bytes of the control words in the output assembly.
+    pub fn control_words(&self) -> impl Iterator<Item = Range<usize>> {
+        let words = self.output().into_iter().filter(|field| field.name == OutputField::Control.name());
+        words.map(|field| field.offset..field.offset + field.len)
     }
 
     /// The fields of the input assembly in their order.

@@ -434,6 +434,27 @@ fn local_control_moves_the_axis_only_while_no_controller_owns_it() {
     plc.enable();
 }
 
+/// Datagrams that come together, as after a pause of the network or of the gateway: what takes the torque away is not lost among them.
+#[test]
+fn idle_or_a_word_without_enable_counts_among_datagrams_that_come_together() {
+    for idle in [true, false] {
+        let mut plc = in_motion();
+        if idle {
+            plc.run = false;
+        } else {
+            plc.word(Control::empty());
+        }
+        let data = plc.data();
+        plc.send(&data);
+        plc.run = true;
+        plc.word(Control::ENABLE | Control::START);
+        plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+        plc.run_for(40);
+        let expected = if idle { FaultCause::COMMAND_LOST } else { FaultCause(0) };
+        assert_eq!(plc.fault(), expected, "idle {idle}");
+    }
+}
+
 #[test]
 fn a_closed_connection_stops_as_a_lost_one() {
     let mut plc = in_motion();

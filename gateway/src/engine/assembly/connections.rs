@@ -4,10 +4,14 @@
 //! the first one that counted. Data of another length than the assembly's do not count: the connection then times out. A
 //! repeated sequence count keeps the connection, and its data are no new ones.
 //!
+//! Of datagrams that come together the newest set-points count. A change of run or of a control word is handed on first, however soon the
+//! next one comes: what follows waits in the port for the next call.
+//!
 //! The input assembly is sent to each originator alone, and once to the multicast group, for all connections that asked for that.
 //! The group's stream begins with the first of them and ends with the last.
 
 use std::net::SocketAddrV4;
+use std::ops::Range;
 
 use arrayvec::ArrayVec;
 use profile_cip::assembly::{Assemblies, Link, RUN, RUN_IDLE_LEN};
@@ -137,6 +141,15 @@ impl Connection {
     }
 }
 
+/// What a datagram has changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Change {
+    /// Set-points at most.
+    None,
+    /// Run, or a control word.
+    Order,
+}
+
 fn timeout(open: &OpenParameters) -> DurationNs {
     DurationNs::from_micros(i64::try_from(open.timeout_us).unwrap_or(i64::MAX / 1_000))
 }
@@ -152,6 +165,8 @@ pub(super) struct Connections {
     group: Option<Stream>,
     /// The last data of the owner in run.
     output: Box<[u8]>,
+    /// Where the control words are in them.
+    words: Box<[Range<usize>]>,
     link: Link,
     /// When the last data of the owner would have come on an even network, until they are taken.
     fresh: Option<MonotonicTime>,
@@ -169,6 +184,7 @@ impl Connections {
             ended: ArrayVec::new(),
             group: None,
             output: vec![0; assemblies.output_len()].into_boxed_slice(),
+            words: assemblies.control_words().collect(),
             link: Link::Lost,
             fresh: None,
             arrivals: ArrivalClock::new(DurationNs::from_millis(1)),
@@ -310,8 +326,10 @@ impl Connections {
         for _ in 0..DATAGRAMS_PER_CYCLE {
             let Some(datagram) = port.receive(&mut buffer) else { break };
             let arrival = datagram.arrived_at.map_or(now, |at| at.min(now));
-            if let Err(why) = self.datagram((now, arrival), &buffer[..datagram.len], datagram.from) {
-                self.admission.refuse(now, datagram.from, why);
+            match self.datagram((now, arrival), &buffer[..datagram.len], datagram.from) {
+                Ok(Change::Order) => break,
+                Ok(Change::None) => {}
+                Err(why) => self.admission.refuse(now, datagram.from, why),
             }
         }
         self.buffer = buffer;
@@ -322,7 +340,7 @@ impl Connections {
         (now, arrival): (MonotonicTime, MonotonicTime),
         bytes: &[u8],
         from: SocketAddrV4,
-    ) -> Result<(), Refused> {
+    ) -> Result<Change, Refused> {
         if !self.any() {
             return Err(Refused::NoConnection);
         }
@@ -346,12 +364,16 @@ impl Connections {
             let run = u32::from_le_bytes(*header) & RUN != 0;
             let was_running = self.link == Link::Run;
             self.link = if run { Link::Run } else { Link::Idle };
+            let mut change = if run == was_running { Change::None } else { Change::Order };
             let paced_at = self.arrivals.arrive(arrival, periods);
             if run && (is_new || !was_running) {
+                if self.words.iter().any(|word| self.output[word.clone()] != data[word.clone()]) {
+                    change = Change::Order;
+                }
                 self.output.copy_from_slice(data);
                 self.fresh = Some(paced_at);
             }
-            return Ok(());
+            return Ok(change);
         }
         let expected = self.owner.or(self.listeners.first().copied()).map_or(0, |one| one.open.o_to_t_id);
         let listener = self.listeners.iter_mut().find(|one| one.open.o_to_t_id == id);
@@ -360,7 +382,7 @@ impl Connections {
         listener.received = Some((datagram.encapsulation_sequence, datagram.sequence_count));
         listener.port = Some(from.port());
         (listener.heard, listener.deadline) = (now, now + timeout(&listener.open));
-        Ok(())
+        Ok(Change::None)
     }
 
     /// Sends the input assembly on each connection on which it is due.
@@ -523,6 +545,44 @@ mod tests {
         assert_eq!(connections.output(), Some(&[0x11; 16][..]));
         take(&mut connections, &mut port, at(4_000), &datagram(7, 4, 2, 0, 0x33), plc);
         assert_eq!((connections.link(), connections.output()), (Link::Idle, None));
+    }
+
+    /// The same with its own word in the first two bytes.
+    fn worded(number: u32, run: u32, word: u16, fill: u8) -> Vec<u8> {
+        let [low, high, ..] = number.to_le_bytes();
+        let mut bytes = datagram(7, number, u16::from_le_bytes([low, high]), run, fill);
+        let at = bytes.len() - 16;
+        bytes[at..at + 2].copy_from_slice(&word.to_le_bytes());
+        bytes
+    }
+
+    #[test]
+    fn each_change_of_run_or_of_a_control_word_is_handed_on_before_the_next_one() {
+        let (mut connections, mut port) = owned();
+        take(&mut connections, &mut port, at(1_000), &worded(1, 1, 1, 0x10), (PLC, 2222));
+        let together = [
+            // Set-points alone are overtaken by newer ones.
+            worded(2, 1, 1, 0x20),
+            worded(3, 1, 1, 0x30),
+            worded(4, 1, 0, 0x40),
+            worded(5, 1, 1, 0x50),
+            worded(6, 0, 1, 0x60),
+            worded(7, 0, 0, 0x70),
+            worded(8, 1, 1, 0x80),
+            worded(9, 1, 1, 0x90),
+        ];
+        port.inbound.extend(together.map(|bytes| (bytes, SocketAddrV4::new(PLC, 2222))));
+        let mut seen = Vec::new();
+        for call in 2..8 {
+            connections.receive(at(call * 1_000), &mut port);
+            connections.take_fresh();
+            seen.push(connections.output().map(|data| (data[0], data[15])));
+        }
+        assert_eq!(
+            seen,
+            [Some((0, 0x40)), Some((1, 0x50)), None, Some((1, 0x80)), Some((1, 0x90)), Some((1, 0x90))]
+        );
+        assert!(port.inbound.is_empty());
     }
 
     #[test]
