@@ -434,6 +434,49 @@ fn local_control_moves_the_axis_only_while_no_controller_owns_it() {
     plc.enable();
 }
 
+/// The order is in the same call of the engine as the end of the connection. The axis still moves, and stops as after any lost command.
+#[test]
+fn local_order_beside_the_end_of_the_connection_does_not_take_a_moving_axis() {
+    for order in [Order::Enable, Order::Reset] {
+        let mut plc = plc("{}");
+        let (local, mut end) = LocalNorth::new(plc.rig.engine.axes().len());
+        plc.rig.engine.set_local(local);
+        plc.connect();
+        plc.enable();
+        plc.target(1_000 * TURN, 10 * TURN, 100 * TURN);
+        plc.word(Control::ENABLE | Control::START);
+        plc.run_for(600);
+        assert!((plc.speed() - 10 * NANO).abs() < NANO / 5, "{order:?}: {}", plc.speed());
+        end.requests.push(Request::Order { client: 1, id: 1, axis: 0, order }).expect("room");
+        let place = plc.place();
+        plc.close();
+        // The commands of the next 80 ms: 100 revolutions per second squared are 400 000 nanorevolutions in the square of 2 ms. Where the
+        // ramp follows the set-points there is a tenth more.
+        let command = |plc: &Plc| plc.rig.engine.axes()[0].command().position.get();
+        let mut commands = vec![command(&plc)];
+        let late = plc.rig.now() + DurationNs::from_millis(80);
+        while plc.rig.now() < late {
+            plc.rig.step();
+            let command = command(&plc);
+            if commands.last() != Some(&command) {
+                commands.push(command);
+            }
+        }
+        assert!(commands.len() > 30, "{order:?}: it goes on: {commands:?}");
+        for three in commands.windows(3) {
+            let change = three[2] - 2 * three[1] + three[0];
+            assert!(change.abs() < 500_000, "{order:?}: {change} of {three:?}");
+        }
+        plc.rig.run_for(DurationNs::from_secs(1));
+        let fault = plc.rig.engine.axes()[0].fault().map(|fault| fault.cause);
+        assert_eq!(fault, Some(FaultCause::COMMAND_LOST), "{order:?}");
+        assert_eq!(plc.rig.status().axes[0].owner, Owner::Nobody, "{order:?}");
+        assert_eq!(end.answers.pop().map(|answer| answer.result), Ok(Err(Failure::Stopping)), "{order:?}");
+        // On the ramp from 10 revolutions per second it comes half a revolution further.
+        assert!(plc.rig.torque_free() && plc.place() - place > NANO * 2 / 5, "{order:?}: {}", plc.place());
+    }
+}
+
 /// Datagrams that come together, as after a pause of the network or of the gateway: what takes the torque away is not lost among them.
 #[test]
 fn idle_or_a_word_without_enable_counts_among_datagrams_that_come_together() {

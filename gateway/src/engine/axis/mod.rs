@@ -478,6 +478,12 @@ impl AxisChannel {
         self.state() == DriveState::Operating && self.sequence_step() == SequenceStep::Running
     }
 
+    /// Whether the drive starts, operates or is tested, and no stop has begun.
+    #[must_use]
+    pub fn runs(&self) -> bool {
+        self.state().is_running() && !self.start_stop.is_stopping()
+    }
+
     /// Whether there is nothing to be waited for: it stands without torque, or will not be seen to.
     #[must_use]
     pub fn has_stopped(&self) -> bool {

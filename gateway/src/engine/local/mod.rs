@@ -102,6 +102,8 @@ impl LocalNorth {
             _ if !axis.moves() => Some(Failure::NeverMoves),
             Some(_) => None,
             None => match (order, axis.fault()) {
+                // Its controller is gone since this call, and the stop for that has not begun.
+                (Order::Enable | Order::Reset, None) if axis.runs() => Some(Failure::Stopping),
                 (Order::Enable | Order::Reset, None) | (Order::Reset, Some(_)) => None,
                 (Order::Stop | Order::Disable, _) if !axis.may_have_torque() => {
                     return self.answer(Answer { client, id, result: Ok(None) });

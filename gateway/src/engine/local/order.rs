@@ -146,7 +146,7 @@ pub enum Failure {
     State(DriveState, Option<Awaited>),
     /// The axis is not in operation but in this state.
     NotEnabled(DriveState),
-    /// The drive is still halting the axis.
+    /// The drive is still halting the axis, or has to stop it because its controller has disconnected.
     Stopping,
     /// The axis has this fault.
     Fault(FaultCause),
