@@ -470,6 +470,29 @@ fn a_canopen_drive_positions_and_homes_by_itself() {
     assert_eq!(bench.rig.engine.axes()[0].faults().count(), 0);
 }
 
+/// The acceleration of the jog is the only one that is known: it also brakes.
+#[test]
+fn a_jog_at_velocity_zero_brakes_with_the_acceleration_of_the_jog_before_it() {
+    let mut bench = Bench::new(ALL);
+    bench.order(SLIDE, Order::Enable).unwrap();
+    let moving =
+        Jog { velocity: Velocity(10 * NANO), acceleration: Some(Acceleration(50 * NANO)), time: JOG_TIME };
+    assert_eq!(bench.order(SLIDE, Order::Jog(moving)), Ok(()));
+    bench.run_for(300);
+    assert!(bench.speed(SLIDE) > 9 * NANO, "{}", bench.speed(SLIDE));
+    let brake = Jog { velocity: Velocity::ZERO, acceleration: None, time: JOG_TIME };
+    assert_eq!(bench.order(SLIDE, Order::Jog(brake)), Ok(()));
+    bench.run_for(100);
+    let amid = bench.speed(SLIDE);
+    assert!((3 * NANO..8 * NANO).contains(&amid), "on a ramp: {amid}");
+    bench.run_for(200);
+    let place = bench.place(SLIDE);
+    // Also when the jog would have ended by itself.
+    bench.run_for(300);
+    assert!((bench.place(SLIDE) - place).abs() < NANO / 100, "{} after {place}", bench.place(SLIDE));
+    assert_eq!(bench.state(SLIDE), DriveState::Operating);
+}
+
 /// The end is behind the axis: a jog away from it must not bring the axis back there.
 #[test]
 fn a_jog_away_from_the_end_beyond_it_is_refused() {

@@ -34,13 +34,13 @@ pub fn run(
     let terminal = RawTerminal::open()?;
     let reply = client.ask(&format!("enable {axis}"))?;
     reply.end("enable", "ok enable AXIS ...")?;
-    let order = |sign: &str| {
-        let mut order = format!("jog {axis} {sign}{velocity}");
+    let order = |velocity: &str| {
+        let mut order = format!("jog {axis} {velocity}");
         let _ = acceleration.map(|acceleration| write!(order, " acceleration={acceleration}"));
         order
     };
-    let (forward, backward) = (order(""), order("-"));
-    let (brake, look) = (format!("jog {axis} 0"), format!("status {axis}"));
+    let (forward, backward, brake) = (order(velocity), order(&format!("-{velocity}")), order("0"));
+    let look = format!("status {axis}");
     eprint!("{HELP}\r\n");
     let ended = loop {
         let Some(bytes) = terminal.read(INTERVAL)? else { break Ok(()) };

@@ -14,7 +14,7 @@
 use profile_generic::fault::{FaultCause, Reaction};
 use profile_generic::image::{AxisCommand, StatusBits};
 use profile_generic::mode::{ModeSelection, OperatingMode};
-use profile_generic::quantity::Acceleration;
+use profile_generic::quantity::{Acceleration, Velocity};
 use profile_generic::state::{DriveState, Report, Request};
 use profile_generic::time::{DurationNs, MonotonicTime, SystemTime};
 
@@ -169,6 +169,15 @@ impl LocalAxis {
 
     fn jog(&mut self, now: Now, axis: &mut AxisChannel, jog: Jog) -> Result<(), Failure> {
         check_enabled(axis)?;
+        if jog.velocity == Velocity::ZERO
+            && jog.acceleration.is_none()
+            && let Source::Generator { generator, jog_ends } = &mut self.source
+        {
+            // A profile in progress brakes with its own acceleration: the axis may have no other.
+            generator.profile.brake();
+            *jog_ends = None;
+            return Ok(());
+        }
         let acceleration = generator::acceleration(axis, jog.velocity, jog.acceleration)?;
         let mode = generator::run_mode(axis)?;
         let end = generator::end_of_travel(axis, jog.velocity)?;
