@@ -3,8 +3,10 @@
 use std::net::{Ipv4Addr, SocketAddrV4};
 
 use profile_cip::device::motion_link::{
-    CloseParameters, ConnectionTriad, MotionReply, MotionRequest, OpenParameters, Token,
+    AssemblyOpen, AssemblyRole, CloseParameters, ConnectionTriad, MotionReply, MotionRequest, OpenParameters,
+    Token,
 };
+use profile_cip::wire::network_parameters::Priority;
 use profile_generic::inhibit::Inhibits;
 use profile_generic::state::{Report, Request};
 
@@ -117,12 +119,17 @@ impl Three {
     /// The reply of a device to a request.
     fn ask(&mut self, device: usize, request: MotionRequest) -> MotionReply {
         self.adapters[device].request(request).expect("room");
-        self.now = self.now + DurationNs::from_millis(1);
+        self.pass(DurationNs::from_millis(1));
+        self.adapters[device].reply().expect("a reply")
+    }
+
+    /// A call of the engine after this time.
+    fn pass(&mut self, time: DurationNs) {
+        self.now = self.now + time;
         let mut ports = [Nothing, Nothing, Nothing];
         let mut ports: Vec<&mut dyn NorthPort> =
             ports.iter_mut().map(|port| port as &mut dyn NorthPort).collect();
         self.engine.cycle(self.now, &mut ports, &mut []);
-        self.adapters[device].reply().expect("a reply")
     }
 
     /// Which of the devices would be started anew.
@@ -181,4 +188,39 @@ fn no_device_is_started_anew_while_a_controller_is_connected_to_any_device() {
     let close = CloseParameters { token: Token(9), triad: TRIAD, o_to_t_id: 4 };
     assert_eq!(three.ask(0, MotionRequest::Close(close)), MotionReply::Closed { token: Token(9) });
     assert_eq!(three.granted(), [true; 3]);
+}
+
+/// Without the report the adapter would keep the connection open, and refuse every other controller.
+#[test]
+fn lost_connection_is_reported_once_the_queue_of_replies_has_room() {
+    let assembly = AssemblyOpen {
+        role: AssemblyRole::ExclusiveOwner,
+        t_to_o_rpi_us: 4_000,
+        t_to_o_priority: Priority::SCHEDULED,
+        multicast: false,
+    };
+    for (device, assembly) in [(0, None), (2, Some(assembly))] {
+        let mut three = Three::new();
+        let opened = three.ask(device, MotionRequest::Open(OpenParameters { assembly, ..open() }));
+        assert_eq!(opened, MotionReply::Opened { token: Token(8), outcome: Ok(()) });
+        // Nobody takes the replies: there is room for 32.
+        for token in 0..32 {
+            three.adapters[device].request(MotionRequest::PrepareReset(Token(token))).expect("room");
+            three.pass(DurationNs::from_millis(1));
+        }
+        // The controller has not sent anything for more than ten seconds.
+        three.pass(DurationNs::from_secs(11));
+        three.pass(DurationNs::from_millis(1));
+        let kept: Vec<_> = std::iter::from_fn(|| three.adapters[device].reply()).collect();
+        assert_eq!(kept.len(), 32, "device {device}");
+        assert!(kept.iter().all(|reply| matches!(reply, MotionReply::ResetPrepared { .. })), "{kept:?}");
+        three.pass(DurationNs::from_millis(1));
+        let lost = three.adapters[device].reply();
+        assert!(
+            matches!(lost, Some(MotionReply::ConnectionLost { o_to_t_id: 4, .. })),
+            "device {device}: {lost:?}"
+        );
+        three.pass(DurationNs::from_millis(1));
+        assert_eq!(three.adapters[device].reply(), None, "device {device}: once");
+    }
 }

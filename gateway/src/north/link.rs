@@ -3,11 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
+use arrayvec::ArrayVec;
+use profile_cip::device::connection_manager::LISTENERS_MAX;
 use profile_cip::device::motion_link::{MotionReply, MotionRequest};
 use rtrb::{Consumer, Producer, PushError, RingBuffer};
 
 /// Requests, and replies, that can be under way: one for each stream an adapter serves at once.
 pub const QUEUE_LEN: usize = 32;
+
+/// Connections of a device whose loss can wait to be reported: all that it can have.
+const LOST_MAX: usize = 1 + LISTENERS_MAX;
 
 /// Both ends of a new link.
 #[must_use]
@@ -22,7 +27,8 @@ pub fn motion_link() -> (AdapterEnd, DeviceEnd) {
         connections: Arc::clone(&connections),
         owner_port: Arc::clone(&owner_port),
     };
-    (adapter, DeviceEnd { requests: request_out, replies: reply_in, connections, owner_port })
+    let lost = ArrayVec::new();
+    (adapter, DeviceEnd { requests: request_out, replies: reply_in, lost, connections, owner_port })
 }
 
 /// Marks a port as known, in one number with a connection ID (upper 32 bits) and the port (lower 16).
@@ -77,6 +83,8 @@ impl AdapterEnd {
 pub struct DeviceEnd {
     requests: Consumer<MotionRequest>,
     replies: Producer<MotionReply>,
+    /// Connections that were lost, and the queue had no room to say so: ID, and silence in microseconds.
+    lost: ArrayVec<(u32, u64), LOST_MAX>,
     connections: Arc<AtomicUsize>,
     owner_port: Arc<AtomicU64>,
 }
@@ -105,6 +113,26 @@ impl DeviceEnd {
     #[expect(clippy::result_large_err, reason = "the reply is handed back, and boxing would allocate")]
     pub fn reply(&mut self, reply: MotionReply) -> Result<(), MotionReply> {
         self.replies.push(reply).map_err(|PushError::Full(reply)| reply)
+    }
+
+    /// Reports that a connection was lost. Nobody waits for that as for an answer: what does not fit is kept for [`Self::report_kept`].
+    pub fn report_lost(&mut self, o_to_t_id: u32, silent_us: u64) {
+        if self.lost.is_full() {
+            // More than a device can have: the adapter has closed the oldest by itself.
+            self.lost.remove(0);
+        }
+        self.lost.push((o_to_t_id, silent_us));
+        self.report_kept();
+    }
+
+    /// Reports lost connections for which the queue had no room. Call it in every cycle.
+    pub fn report_kept(&mut self) {
+        while let Some(&(o_to_t_id, silent_us)) = self.lost.first() {
+            if self.reply(MotionReply::ConnectionLost { o_to_t_id, silent_us }).is_err() {
+                return;
+            }
+            self.lost.remove(0);
+        }
     }
 }
 

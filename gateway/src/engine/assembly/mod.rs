@@ -149,6 +149,7 @@ impl AssemblyChannel {
     /// Takes requests of the explicit side and what came on the connections. While the gateway is `in_use`, this device may not be
     /// started anew, whatever its own axes do.
     pub fn receive(&mut self, now: MonotonicTime, in_use: bool, port: &mut dyn NorthPort) {
+        self.link.report_kept();
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(request) = self.link.request() else { break };
             let reply = match request {
@@ -184,11 +185,11 @@ impl AssemblyChannel {
         self.connections.receive(now, port);
         while let Some((o_to_t_id, silent_us)) = self.connections.poll_lost(now) {
             self.lost = true;
-            let _ = self.link.reply(MotionReply::ConnectionLost { o_to_t_id, silent_us });
+            self.link.report_lost(o_to_t_id, silent_us);
         }
         self.connections.end_listen_only();
         while let Some(o_to_t_id) = self.connections.poll_ended() {
-            let _ = self.link.reply(MotionReply::ConnectionLost { o_to_t_id, silent_us: 0 });
+            self.link.report_lost(o_to_t_id, 0);
         }
     }
 

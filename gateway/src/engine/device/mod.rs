@@ -213,6 +213,7 @@ impl DeviceChannel {
     /// started anew, whatever its own axes do.
     pub fn receive(&mut self, now: MonotonicTime, time: &TimeBase, in_use: bool, port: &mut dyn NorthPort) {
         let system = time.system_at(now);
+        self.link.report_kept();
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(request) = self.link.request() else { break };
             match request {
@@ -394,8 +395,15 @@ impl DeviceChannel {
             }
         }
         while let Some(reply) = self.device.poll_reply() {
-            // A full queue means that the explicit side has given up waiting.
-            let _ = self.link.reply(reply);
+            match reply {
+                MotionReply::ConnectionLost { o_to_t_id, silent_us } => {
+                    self.link.report_lost(o_to_t_id, silent_us);
+                }
+                answer => {
+                    // A full queue means that the explicit side has given up waiting.
+                    let _ = self.link.reply(answer);
+                }
+            }
         }
     }
 }
