@@ -14,7 +14,7 @@ use profile_cip::wire::encapsulation::IO_PORT;
 use profile_cip::wire::forward_open::ForwardOpenReply;
 use profile_generic::fault::FaultCause;
 use profile_generic::parameter::Parameter;
-use profile_generic::quantity::{Torque, Velocity};
+use profile_generic::quantity::{Position, Torque, Velocity};
 use profile_generic::sequence::StopMethod;
 use profile_generic::state::DriveState;
 use profile_generic::time::DurationNs;
@@ -496,6 +496,19 @@ fn idle_or_a_word_without_enable_counts_among_datagrams_that_come_together() {
         let expected = if idle { FaultCause::COMMAND_LOST } else { FaultCause(0) };
         assert_eq!(plc.fault(), expected, "idle {idle}");
     }
+}
+
+/// The following error belongs to a command that is followed. Without torque there is none.
+#[test]
+fn following_error_is_zero_once_nothing_is_followed() {
+    let mut plc = in_motion();
+    let lag = plc.get(0, "following_error");
+    assert_ne!(lag, 0);
+    plc.word(Control::empty());
+    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+    plc.run_for(40);
+    assert_eq!(plc.get(0, "following_error"), 0);
+    assert_eq!(plc.rig.status().axes[0].following_error, Position::ZERO);
 }
 
 #[test]

@@ -269,16 +269,14 @@ impl AxisChannel {
     /// about it. It is over when the axis is not led any more. `moved` is whether the axis could move before the drive has
     /// spoken: a drive that stops by itself reports a switch and its fault at once.
     fn watch(&mut self, now: MonotonicTime, system: SystemTime, moved: bool) {
-        let mut error = None;
-        if self.state() == DriveState::Operating && self.command.selection() == OperatingMode::Position.into()
-        {
-            let way = self.command.position.saturating_sub(self.feedback.position);
-            if self.feedback.get(Signal::FollowingError).is_none() {
-                self.feedback.following_error = way;
-            }
-            // In its own halt the drive comes to rest behind the last command, and shall.
-            error = Some(way).filter(|_| self.drive.action == Action::Enable);
+        let followed = self.state() == DriveState::Operating
+            && self.command.selection() == OperatingMode::Position.into();
+        let error = followed.then(|| self.command.position.saturating_sub(self.feedback.position));
+        if self.feedback.get(Signal::FollowingError).is_none() {
+            self.feedback.following_error = error.unwrap_or_default();
         }
+        // In its own halt the drive comes to rest behind the last command, and shall.
+        let error = error.filter(|_| self.drive.action == Action::Enable);
         let is_led = |axis: &Self| matches!(axis.state(), DriveState::Operating | DriveState::Testing);
         let of_user = self.start_stop.settings.user_limits.speed;
         let passed = self.supervision.passed_limits(&self.feedback, is_led(self), error, of_user);
@@ -423,6 +421,7 @@ impl AxisChannel {
     fn end_south(&mut self, now: MonotonicTime, system: SystemTime, report: Report) {
         self.feedback.fresh = false;
         self.feedback.present = FeedbackSet::empty();
+        self.feedback.following_error = Position::ZERO;
         self.diagnosis = super::Diagnosis::default();
         self.faults.end_all(Origin::Drive, |_| false);
         self.faults.end_all(Origin::Warning, |_| false);
