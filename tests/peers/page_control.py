@@ -17,7 +17,7 @@ import time
 import urllib.request
 from pathlib import Path
 
-from page import FAINT, VIEW, Browser
+from page import FAINT, LIVE, VIEW, Browser
 
 SAYS = "document.getElementById('control-says').textContent"
 JOG = "document.getElementById('{}')"
@@ -105,6 +105,10 @@ def main():
         browser = Browser(chromium, profile, ["--ignore-certificate-errors"])
         try:
             browser.open(f"{url}#/axis/turntable", f"!!{VIEW} && {VIEW}.id === 'view-axis'")
+            # The question whether control is offered has failed: it is asked again.
+            browser.until("control.offer !== null", "the offer of control")
+            browser.value("control.offer = null")
+            browser.until("control.offer !== null", "the offer of control once more")
             for secret in ("not-the-right-token", token):
                 browser.until("document.querySelector('#token')?.checkVisibility() ?? false", "the login")
                 browser.value("document.getElementById('token').focus()")
@@ -139,6 +143,13 @@ def main():
             browser.until(f"{SAYS} === 'move: done'", "the move")
             report["moved"] = axis(url)["position"]
             report["wide"], report["faint"] = pictures(browser, folder)
+
+            # The events end, and the stream of control lives: the axis keeps its torque.
+            browser.value("source.close(); source.dispatchEvent(new Event('error'))")
+            browser.until("document.body.classList.contains('stale')", "the end of the events")
+            browser.until(f"{LIVE} && !isAnew", "the next events")
+            time.sleep(1.0)
+            report["kept"] = [axis(url)["state"], axis(url)["owner"], browser.value("control.socket !== null && !document.getElementById('stop-bar').hidden")]
 
             # Another view gives control back.
             browser.value("window.location.hash = '#/time'")

@@ -461,6 +461,11 @@ fn page_jogs_while_the_button_is_held_and_stops_when_it_closes() {
         assert!((report["moved"].as_f64().expect("a number") - 0.25).abs() < 0.002, "{report}");
         assert_eq!(report["faint"], Value::Array(Vec::new()), "too little contrast");
         assert_eq!(report["wide"], false, "wider than the screen");
+        assert_eq!(
+            report["kept"],
+            serde_json::json!(["operating", "local", true]),
+            "control outlives a reconnection of the events"
+        );
         // The stream of the page was open while another client took the axis, which kept its torque.
         assert!(
             report["other_has"].as_str().is_some_and(|reply| reply.starts_with("ok enable turntable ")),

@@ -4,7 +4,7 @@
 // The key of the session is kept in the memory of the page alone. `held` is the direction of the jog that is held. `owner` is that of the
 // axis by the stream; `ours` says that an order of this stream may be why it is `local`, and `pending` counts orders without a reply.
 const control = {
-  offer: null, key: null, socket: null, beat: 0, axis: null, nodes: null, allowed: false,
+  offer: null, asking: false, key: null, socket: null, beat: 0, axis: null, nodes: null, allowed: false,
   state: '', owner: '', ours: false, pending: 0, held: null,
 };
 
@@ -103,11 +103,18 @@ function buildControl(node, axis) {
     nodes: { says, login, secret, parts, caution, take, back, out, enable, disable, reset, velocity, acceleration, minus, plus, target, move, home, live },
     said: null,
   });
-  if (control.offer === null) {
-    fetchOnce('/api/v1/session', (offer) => {
-      control.offer = offer;
-    });
-  }
+}
+
+// Asks whether axes can be controlled from here. The next event asks again if there was no answer.
+function askForOffer() {
+  if (control.offer !== null || control.asking) return;
+  control.asking = true;
+  fetchOnce('/api/v1/session', (offer) => {
+    control.offer = offer;
+    control.asking = false;
+  }, () => {
+    control.asking = false;
+  });
 }
 
 // What is written into empty fields: a tenth of the velocity limit.
@@ -142,6 +149,7 @@ function obstacle(axis) {
 
 function showControl(axis) {
   const { nodes } = control;
+  askForOffer();
   const why = obstacle(axis);
   const isOffered = control.offer !== null && control.offer.control;
   nodes.login.hidden = !isOffered || control.key !== null;

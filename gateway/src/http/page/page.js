@@ -323,9 +323,13 @@ let isAnew = false;
 function beginAnew(restarted) {
   if (restarted) giveBack('Control was given back: the gateway has started again.');
   seen.faults = seen.log = null;
-  axisView.name = mappingView.name = busView.name = null;
+  mappingView.name = busView.name = null;
   timeView.built = false;
-  control.offer = null;
+  // A stream of control that is open is one to the same process: the axis goes on, and so does its view.
+  if (control.socket === null) {
+    axisView.name = null;
+    control.offer = null;
+  }
   isAnew = false;
 }
 
