@@ -142,13 +142,14 @@ impl Store {
         })
     }
 
-    /// The settings for another run of the gateway in this process: these for the same file, so that what was set lasts as long as the
-    /// process even without one.
+    /// The settings for another run of the gateway in this process. Without a file, and while the last one could not be written to it,
+    /// they are these: what was set lasts as long as the process. Else the file counts, which somebody may have changed.
     ///
     /// # Errors
     /// As of [`Store::open`].
     pub fn reopen(self: &Arc<Self>, path: Option<&Path>) -> Result<Arc<Self>, SettingsError> {
-        if self.path.as_deref() == path { Ok(Arc::clone(self)) } else { Self::open(path).map(Arc::new) }
+        let is_kept = self.path.as_deref() == path && (path.is_none() || self.is_unsaved());
+        if is_kept { Ok(Arc::clone(self)) } else { Self::open(path).map(Arc::new) }
     }
 
     /// Puts what was set at a device into its configuration.
@@ -277,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn another_run_has_the_same_settings_unless_they_are_in_another_file() {
+    fn another_run_has_what_was_set_or_what_the_file_says() {
         let first = Store::open(None).map(Arc::new).unwrap();
         first.note("press", &Event::InactivityTimeoutChanged { seconds: 7 }).unwrap();
         let second = first.reopen(None).unwrap();
@@ -288,7 +289,12 @@ mod tests {
         third.note("press", &Event::InactivityTimeoutChanged { seconds: 8 }).unwrap();
         assert_eq!(applied(&third.reopen(Some(&path)).unwrap(), "press").1, 8);
         assert_eq!(applied(&third.reopen(None).unwrap(), "press").1, 120);
+        // Somebody has removed the file.
         std::fs::remove_file(&path).unwrap();
+        assert_eq!(applied(&third.reopen(Some(&path)).unwrap(), "press").1, 120);
+        // It could not be written: what was set is here alone.
+        third.unsaved.store(true, Ordering::Relaxed);
+        assert_eq!(applied(&third.reopen(Some(&path)).unwrap(), "press").1, 8);
     }
 
     #[test]

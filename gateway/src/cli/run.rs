@@ -55,10 +55,10 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
         let of_run = |path: &Path| if path.is_file() { capture_of(path, number) } else { path.to_owned() };
         let capture = arguments.capture.as_deref().map(of_run);
         number += 1;
-        let outputs = Outputs { capture: capture.as_deref(), settings: &settings, histories: &histories };
-        let running = match (start(&good, arguments, &outputs), before.take()) {
+        let outputs = Outputs { capture: capture.as_deref(), histories: &histories };
+        let running = match (start(&good, arguments, &outputs, &mut settings), before.take()) {
             (Ok(running), _) => running,
-            (Err(error), None) => return Err(error.into()),
+            (Err(error), None) => return Err(error),
             (Err(error), Some(previous)) => {
                 error!("the gateway cannot start with the new configuration: {error}");
                 warn!("the gateway starts with the configuration that it had before");
@@ -66,14 +66,12 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, CliError> {
                 continue;
             }
         };
-        match run_once(running, &settings, arguments, &asked, &manager)? {
+        match run_once(running, arguments, &asked, &manager)? {
             After::End { rested: true } => return Ok(ExitCode::SUCCESS),
             After::End { rested: false } => return Ok(ExitCode::FAILURE),
             After::Again(None) => {}
             After::Again(Some(next)) => {
-                let Next { good: next, settings: of_next } = *next;
-                before =
-                    Some((std::mem::replace(&mut good, next), std::mem::replace(&mut settings, of_next)));
+                before = Some((std::mem::replace(&mut good, *next), Arc::clone(&settings)));
             }
         }
     }
@@ -96,7 +94,6 @@ fn capture_of(path: &Path, number: u32) -> PathBuf {
 /// Where a run of the gateway writes.
 struct Outputs<'a> {
     capture: Option<&'a Path>,
-    settings: &'a Arc<Store>,
     histories: &'a Histories,
 }
 
@@ -115,12 +112,6 @@ struct Asked {
     reload: Arc<AtomicBool>,
 }
 
-/// Files that were read again, and the settings that they name.
-struct Next {
-    good: Good,
-    settings: Arc<Store>,
-}
-
 /// What comes after a run of the box.
 enum After {
     /// Nothing.
@@ -129,7 +120,7 @@ enum After {
         rested: bool,
     },
     /// Another run, with other files where some were read.
-    Again(Option<Box<Next>>),
+    Again(Option<Box<Good>>),
 }
 
 /// Reads the configuration and its tables, as `check` does.
@@ -163,30 +154,31 @@ fn tell(findings: &Findings) {
     }
 }
 
-/// Starts the box.
+/// Starts the box with the settings of its file, or with these.
 fn start(
     good: &Good,
     arguments: &RunArguments,
     outputs: &Outputs<'_>,
-) -> Result<runner::RunningBox, runner::StartError> {
+    settings: &mut Arc<Store>,
+) -> Result<runner::RunningBox, CliError> {
+    *settings = settings.reopen(good.config.settings_file.as_deref())?;
     let extras = runner::Extras {
         capture: outputs.capture,
         local: arguments.local.as_deref(),
         histories: Some(outputs.histories),
         files: Some(&good.files),
     };
-    runner::start(&good.config, good.mapping.clone(), extras, outputs.settings)
+    Ok(runner::start(&good.config, good.mapping.clone(), extras, settings)?)
 }
 
 /// Runs the box once. Files that are read again and refused leave it as it is.
 fn run_once(
     running: runner::RunningBox,
-    settings: &Arc<Store>,
     arguments: &RunArguments,
     asked: &Asked,
     manager: &RefCell<ServiceManager>,
 ) -> Result<After, CliError> {
-    let (next, reloads) = attend(&running, settings, arguments, asked, manager)?;
+    let (next, reloads) = attend(&running, arguments, asked, manager)?;
     let stops = asked.stop.load(Ordering::Relaxed);
     info!(
         "axisbridge stops: the axes stop, then the bus goes down; a second signal ends the wait for the axes"
@@ -210,11 +202,10 @@ fn run_once(
 /// Stays with a running gateway until it is to stop or to start again; the files that were read again, and whether they are why.
 fn attend(
     running: &runner::RunningBox,
-    settings: &Arc<Store>,
     arguments: &RunArguments,
     asked: &Asked,
     manager: &RefCell<ServiceManager>,
-) -> Result<(Option<Box<Next>>, bool), CliError> {
+) -> Result<(Option<Box<Good>>, bool), CliError> {
     let mut told = false;
     let mut next = None;
     let mut reloads = false;
@@ -232,7 +223,7 @@ fn attend(
             return Err("the cycle thread has ended by itself; see above".into());
         }
         if asked.reload.swap(false, Ordering::Relaxed) {
-            (next, reloads) = replace(next, reload(&arguments.config, settings), running.has_torque());
+            (next, reloads) = replace(next, reload(&arguments.config), running.has_torque());
         }
     }
     Ok((next, reloads))
@@ -271,8 +262,8 @@ fn replace<T>(before: Option<T>, read: Option<T>, has_torque: bool) -> (Option<T
     (read, starts)
 }
 
-/// Reads the files again, and the settings if they are to be in another file; `None` when they are refused.
-fn reload(path: &Path, settings: &Arc<Store>) -> Option<Box<Next>> {
+/// Reads the files again; `None` when they are refused, or the file of the settings could not be used at the start.
+fn reload(path: &Path) -> Option<Box<Good>> {
     let refused = || warn!("configuration and tables are refused: the gateway keeps the present ones");
     let (good, findings) = match read(path) {
         Ok(read) => read,
@@ -283,17 +274,14 @@ fn reload(path: &Path, settings: &Arc<Store>) -> Option<Box<Next>> {
             return None;
         }
     };
-    let settings = match Store::reopen(settings, good.config.settings_file.as_deref()) {
-        Ok(settings) => settings,
-        Err(error) => {
-            error!("{error}");
-            refused();
-            return None;
-        }
-    };
+    if let Err(error) = Store::open(good.config.settings_file.as_deref()) {
+        error!("{error}");
+        refused();
+        return None;
+    }
     info!(file = %path.display(), "configuration and tables were read again, without errors");
     tell(&findings);
-    Some(Box::new(Next { good, settings }))
+    Some(Box::new(good))
 }
 
 /// What is logged: what `wanted` says (`debug`, or `info,axisbridge::modbus=trace`), or else the level of the file; and why not what is wanted. The

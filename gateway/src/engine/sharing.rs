@@ -50,6 +50,11 @@ pub(super) enum Rescaling {
 }
 
 impl Rescaling {
+    /// Whether such a write is under way.
+    pub fn is_busy(self) -> bool {
+        self != Self::None
+    }
+
     /// The drive was asked for this access.
     pub fn asked(&mut self, access: &Access) {
         if let Operation::Write(data) = &access.operation

@@ -43,7 +43,8 @@ pub struct Handle {
     statistics: watch::Receiver<Statistics>,
     stop: watch::Sender<bool>,
     ended: oneshot::Receiver<()>,
-    thread: JoinHandle<()>,
+    /// `None` once it is joined.
+    thread: Option<JoinHandle<()>>,
 }
 
 impl Handle {
@@ -60,12 +61,22 @@ impl Handle {
     }
 
     /// Ends the server and all its streams, and returns what it has counted.
-    pub async fn stop(self) -> Statistics {
+    pub async fn stop(mut self) -> Statistics {
         self.stop.send_replace(true);
         // The sender is gone when the server is, however it ended; what is left of the thread takes no time.
-        let _ = self.ended.await;
-        let _ = self.thread.join();
+        let _ = (&mut self.ended).await;
         self.statistics.borrow().clone()
+    }
+}
+
+/// Its ports are free afterwards: a start that has failed elsewhere is followed by another one.
+impl Drop for Handle {
+    fn drop(&mut self) {
+        self.stop.send_replace(true);
+        if let Some(thread) = self.thread.take() {
+            // A panic has been printed where it happened.
+            let _ = thread.join();
+        }
     }
 }
 
@@ -87,5 +98,5 @@ pub fn spawn(server: ExplicitServer) -> Result<Handle, ServeError> {
         runtime.block_on(running.run(stopped));
         drop((runtime, end));
     });
-    Ok(Handle { address, statistics, stop, ended, thread: thread.map_err(system)? })
+    Ok(Handle { address, statistics, stop, ended, thread: Some(thread.map_err(system)?) })
 }

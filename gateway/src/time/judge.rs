@@ -231,14 +231,17 @@ impl Judge {
     fn measured(&mut self, offset: i64, now: MonotonicTime) -> SyncPhase {
         self.heard(now);
         let offset = offset.unsigned_abs();
-        self.last_offset = offset;
-        if offset > self.threshold {
-            self.bad = self.bad.saturating_add(1);
+        let is_good = offset <= self.threshold;
+        self.bad = if is_good { 0 } else { self.bad.saturating_add(1) };
+        // One alone may have come late, and says nothing of the clock.
+        if is_good || self.bad > 1 || self.last_offset == u64::MAX {
+            self.last_offset = offset;
+        }
+        if !is_good {
             if self.bad >= BAD {
                 self.good = 0;
                 return SyncPhase::Uncalibrated(Reason::Offset);
             }
-            // One alone may have come late.
             return match self.phase {
                 SyncPhase::Synchronized | SyncPhase::Holdover => SyncPhase::Synchronized,
                 SyncPhase::Uncalibrated(Reason::NoDelay | Reason::NoSync) => {
@@ -247,7 +250,7 @@ impl Judge {
                 phase => phase,
             };
         }
-        (self.good, self.bad) = (self.good.saturating_add(1), 0);
+        self.good = self.good.saturating_add(1);
         match self.phase {
             SyncPhase::Synchronized | SyncPhase::Holdover => SyncPhase::Synchronized,
             _ if self.good >= GOOD => SyncPhase::Synchronized,
@@ -387,7 +390,11 @@ mod tests {
         assert_eq!(Judge::new(THRESHOLD).error_bound(at(1)), u64::MAX, "nothing was measured");
         let mut judge = synchronized();
         judge.handle(Event::Offset(-50_000), at(11));
-        assert_eq!(judge.error_bound(at(13)), 51_000);
+        assert_eq!(judge.error_bound(at(13)), 1_500, "one alone may have come late");
+        let mut held = judge;
+        assert_eq!(held.handle(Event::NoMaster, at(13)), Some(SyncPhase::Holdover));
+        judge.handle(Event::Offset(50_000), at(12));
+        assert_eq!(judge.error_bound(at(13)), 50_500);
         assert_eq!(judge.handle(Event::NoMaster, at(13)), Some(SyncPhase::Listening), "it is not held over");
         judge.handle(Event::Master { grandmaster: true }, at(14));
         assert_eq!(judge.error_bound(at(15)), u64::MAX, "of another grandmaster nothing was measured");

@@ -159,7 +159,12 @@ impl Translator {
     /// Goes on with the programs of another stage of the same box.
     fn change_stage(&mut self, stage: Arc<Stage>) {
         self.bench.take().into_iter().for_each(|bench| self.stage.keep(bench));
-        self.states = Self::unheard(&stage);
+        let states = Self::unheard(&stage);
+        let before = std::mem::replace(&mut self.states, states);
+        // The axes are the same, and a fault that was shown has not ended by this.
+        for (state, before) in self.states.iter_mut().zip(before) {
+            state.has_fault = before.has_fault;
+        }
         self.stage = stage;
     }
 

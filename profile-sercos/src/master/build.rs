@@ -155,6 +155,11 @@ pub(super) struct TimeField {
 }
 
 impl TimeField {
+    /// A cycle was built and not sent: that of this count is built once more, with another time if it begins the eight.
+    pub fn take_back(&mut self, cycle_count: u8) {
+        self.toggle ^= cycle_count == 0 && self.latched.is_some();
+    }
+
     /// The extended field with the fragment of the system time that belongs to this cycle: seconds and nanoseconds
     /// in four halves, each sent in two cycles, latched for all eight. Without a time for the first of them all eight say that there
     /// is none.
@@ -236,5 +241,11 @@ mod tests {
         assert_eq!(round(None), (0, vec![0; 8]));
         assert_eq!(round(Some(7)), (valid | toggle, vec![0, 0, 0, 0, 0, 0, 7, 7]));
         assert_eq!(round(None), (toggle, vec![0; 8]), "the toggle waits for the next time");
+        // The first cycle of eight is built and not sent: its time was never on the wire.
+        time.field(Some(SystemTime(7)), 0);
+        time.take_back(0);
+        assert_eq!(time.field(Some(SystemTime(8)), 0).word, valid);
+        time.take_back(1);
+        assert_eq!(time.field(None, 1).word, valid);
     }
 }

@@ -251,6 +251,7 @@ impl Master {
             self.grid.left_out = true;
             // Slaves count the cycles that they see.
             net.cycle_count = net.cycle_count.wrapping_sub(1) & 7;
+            net.time.take_back(net.cycle_count);
             skipped += 1;
         }
         if !net.frames.has_transmit() {

@@ -651,7 +651,7 @@ mod tests {
     #[test]
     fn torque_that_the_drive_does_not_report_is_not_at_its_reference() {
         let scale = Scale { counts_per_unit: 1, rated_torque: 0 };
-        let config = AssemblyAxis { axis: 0, instance: 1, scale, stops: StopSettings::default() };
+        let config = AssemblyAxis { axis: 0, instance: 1, scale };
         let mut plc = PlcAxis::new(&config);
         (plc.source, plc.torque) = (Source::Cyclic, Some(Torque::ZERO));
         let now = (MonotonicTime::ZERO, SystemTime(0));

@@ -174,6 +174,17 @@ impl AxisChannel {
         }
     }
 
+    /// Whether a reset waits for the end of a stop, or is under way.
+    #[must_use]
+    pub fn has_reset(&self) -> bool {
+        self.orders.has_reset()
+    }
+
+    /// Does without a reset that waits for the end of a stop: something newer has come.
+    pub fn drop_waiting_reset(&mut self) {
+        self.orders.drop_waiting_reset();
+    }
+
     /// Number of the last reset that was carried out.
     #[must_use]
     pub fn reset_id(&self) -> u32 {

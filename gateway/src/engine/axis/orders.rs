@@ -166,6 +166,13 @@ impl Orders {
         self.reset = Some(Reset { id, since: now, begun: false });
     }
 
+    /// A reset that has not begun counts as carried out.
+    pub fn drop_waiting_reset(&mut self) {
+        if let Some(reset) = self.reset.take_if(|reset| !reset.begun) {
+            self.reset_id = reset.id;
+        }
+    }
+
     /// Whether a reset waits or is under way.
     pub fn has_reset(&self) -> bool {
         self.reset.is_some()
@@ -222,8 +229,13 @@ mod tests {
         assert!(!orders.has_reset());
         orders.begin_reset(NOW, 9);
         assert_eq!(orders.end_reset(NOW, true, true), None, "it has not begun");
+        orders.drop_waiting_reset();
+        assert_eq!((orders.has_reset(), orders.is_new_reset(9)), (false, false));
+        orders.begin_reset(NOW, 10);
         orders.advance_reset(NOW, false);
-        assert_eq!((orders.end_reset(NOW, true, true), orders.reset_id()), (Some(ResetStep::Abandon), 9));
+        orders.drop_waiting_reset();
+        assert!(orders.resets(), "it has begun");
+        assert_eq!((orders.end_reset(NOW, true, true), orders.reset_id()), (Some(ResetStep::Abandon), 10));
     }
 
     #[test]

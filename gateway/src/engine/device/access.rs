@@ -271,6 +271,8 @@ impl Accesses {
                     Next::Ask(request) if is_held && is_rescaling(&request) => {
                         return Some(Err(ParameterFailure::Torque));
                     }
+                    // One such write at a time, so that each counts.
+                    Next::Ask(request) if rescaling.is_busy() && is_rescaling(&request) => return None,
                     Next::Ask(request) => request,
                 };
                 let Computed { ticket, attribute, write } = *what;

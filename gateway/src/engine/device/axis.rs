@@ -127,6 +127,11 @@ impl CipAxis {
         order: Option<AbortOrder>,
         loss: Option<Loss>,
     ) {
+        let by_controller = |order: &AbortOrder| order.cause == AbortCause::Controller;
+        if order.as_ref().is_some_and(by_controller) && !self.abort.as_ref().is_some_and(by_controller) {
+            // The controller has cancelled a reset that waits for the end of the stop, if there is one.
+            axis.drop_waiting_reset();
+        }
         let new = order.filter(|order| self.abort.is_none_or(|known| known.action != order.action));
         self.abort = order;
         let Some(order) = new.filter(|_| axis.may_have_torque()) else { return };

@@ -293,6 +293,8 @@ impl LocalAxis {
                 (None, state) if state != DriveState::Faulted && state != DriveState::FaultReaction => {
                     Some(Ok(()))
                 }
+                // It has ended without success.
+                (Some(fault), _) if !axis.has_reset() => Some(Err(Failure::Fault(fault.cause))),
                 (fault, state) if waited > STOP_TIME_OUT + RESET_TIME_OUT => {
                     let failure = fault
                         .map_or(Failure::State(state, axis.awaited()), |fault| Failure::Fault(fault.cause));

@@ -254,7 +254,11 @@ impl Player<'_> {
         }
         let begun = Instant::now();
         loop {
-            self.exchange()?;
+            match self.exchange() {
+                // The device may hear what it does not answer: it gets the words once more for as long as its own time-out lasts.
+                Err(PlcError::ConnectionLost { limit }) if begun.elapsed() < limit => continue,
+                other => other?,
+            }
             let on = axes.iter().find(|axis| self.images.status(**axis).contains(Status::TORQUE));
             let Some(axis) = on else { return Ok(()) };
             if begun.elapsed() >= HANDSHAKE {

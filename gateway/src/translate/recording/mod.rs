@@ -224,11 +224,13 @@ impl Recording<'_> {
                 is_cyclic
             }
             Packet::Udp { from, to, payload } if is_io(from, to) => {
+                let ends = (*from.ip(), *to.ip());
                 let datagram = match Class1Datagram::parse(payload) {
                     Ok(datagram) => datagram,
-                    Err(error) => return self.unreadable(frame, error.to_string(), |_| true),
+                    Err(error) => {
+                        return self.unreadable(frame, error.to_string(), |_| self.may_be_motion(ends));
+                    }
                 };
-                let ends = (*from.ip(), *to.ip());
                 let known = self.decoder.connection(datagram.connection_id, ends.0, ends.1);
                 // Opened before the recording began: the data say what they are, or else whose they are.
                 let motion = known.map_or_else(
@@ -252,9 +254,10 @@ impl Recording<'_> {
             }
             Packet::CutUdp { from, to, payload, what } if is_io(from, to) => {
                 let id = payload.get(CONNECTION_ID_OFFSET..).and_then(<[u8]>::first_chunk);
+                let ends = (*from.ip(), *to.ip());
                 let known =
-                    id.and_then(|id| self.decoder.connection(u32::from_le_bytes(*id), *from.ip(), *to.ip()));
-                let motion = known.is_none_or(|(_, motion)| motion);
+                    id.and_then(|id| self.decoder.connection(u32::from_le_bytes(*id), ends.0, ends.1));
+                let motion = known.map_or_else(|| self.may_be_motion(ends), |(_, motion)| motion);
                 return self.unreadable(frame, frame.cut().unwrap_or(what), |_| motion);
             }
             _ => false,
@@ -281,6 +284,13 @@ impl Recording<'_> {
     /// Whether a CIP Motion device of the configuration has this address.
     fn has_motion(&self, address: Ipv4Addr) -> bool {
         self.config.devices.iter().any(|device| device.listen == address && device.assembly.is_none())
+    }
+
+    /// Whether data that cannot be read, of a connection that was not seen to open, may be updates: if an end is a CIP Motion device of
+    /// the configuration or the one that stands for it, or as long as none of them was there.
+    fn may_be_motion(&self, (from, to): (Ipv4Addr, Ipv4Addr)) -> bool {
+        let is_first = self.oddities.first_device().is_none_or(|device| [from, to].contains(&device));
+        is_first || self.has_motion(from) || self.has_motion(to)
     }
 
     /// Takes an update as one of the device that it goes to or comes from. A device with another address than those of the

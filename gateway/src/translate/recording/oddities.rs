@@ -89,6 +89,11 @@ impl Oddities {
         self.first_device = Some(device);
     }
 
+    /// The device whose updates have come, or that stands for one of the configuration.
+    pub const fn first_device(&self) -> Option<Ipv4Addr> {
+        self.first_device
+    }
+
     /// Whether a device that the configuration does not have is the first such one.
     pub fn stands_for_the_first(&mut self, device: Ipv4Addr) -> bool {
         *self.first_device.get_or_insert(device) == device
