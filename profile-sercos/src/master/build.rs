@@ -96,7 +96,7 @@ impl Network {
         hot_plug: Option<[HotPlug; 2]>,
         search: &Isolation,
     ) {
-        let (stations, layout, phase) = (&self.stations, &self.layout, self.stations.phase);
+        let (layout, phase) = (&self.layout, self.stations.phase);
         let ring = self.redundancy.is_closed();
         let used = |lengths: [usize; TELEGRAMS_MAX]| (0u8..).zip(lengths).filter(|&(_, len)| len > 0);
         for (number, len) in used(mdt) {
@@ -108,7 +108,7 @@ impl Network {
             let field = data.get_mut(EXTENDED_OFFSET..EXTENDED_OFFSET + EXTENDED_LEN);
             let _ = field.map(|field| extended.emit(field));
         }
-        for (index, station) in stations.iter().enumerate() {
+        for (index, station) in self.stations.iter_mut().enumerate() {
             if let Some(slot) = slot(phase, layout, index, Kind::Mdt) {
                 fill_station(&mut mdts, slot, station, ring, station.is_addressed(phase));
             }
@@ -196,9 +196,9 @@ fn fill_station(mdts: &mut Mdts<'_>, slot: Slot, station: &Station, ring: bool, 
 }
 
 /// Writes what a slave consumes.
-fn fill_connections(mdts: &mut Mdts<'_>, layout: &CyclicLayout, index: usize, station: &Station) {
+fn fill_connections(mdts: &mut Mdts<'_>, layout: &CyclicLayout, index: usize, station: &mut Station) {
     let Some(Some(places)) = layout.slaves.get(index) else { return };
-    for (connection, end) in station.connections.iter().zip(&station.ends) {
+    for (connection, end) in station.connections.iter().zip(&mut station.ends) {
         let End::Producer(producer) = end else { continue };
         let place = places.connections.iter().find(|place| place.instance == connection.instance);
         let range = place.map(|place| (place.at.telegram, place.at.range(usize::from(place.len))));

@@ -254,12 +254,25 @@ pub(crate) struct ProducerEnd {
     /// What goes out: changed by a commit only.
     sent: ArrayVec<u8, DATA_MAX>,
     data: ArrayVec<u8, DATA_MAX>,
+    /// There was a commit since telegrams were built last.
+    is_new: bool,
+    /// The C-CON of these telegrams was another one than before.
+    is_first: bool,
+    /// These telegrams were not sent: nobody has seen that C-CON.
+    is_unseen: bool,
 }
 
 impl ProducerEnd {
     /// A producer of `len` bytes with C-CON.
     pub fn new(len: u16) -> ProducerEnd {
-        ProducerEnd { data: zeros(len), sent: zeros(len), control: ConnectionControl::empty() }
+        ProducerEnd {
+            data: zeros(len),
+            sent: zeros(len),
+            control: ConnectionControl::empty(),
+            is_new: false,
+            is_first: false,
+            is_unseen: false,
+        }
     }
 
     /// The values for the next commit.
@@ -267,19 +280,30 @@ impl ProducerEnd {
         &mut self.data
     }
 
-    /// Makes the values the new ones: ready, toggled, counted.
+    /// Makes the values the new ones: ready, toggled, counted. In place of values that nobody has seen they are counted once.
     pub fn commit(&mut self) {
         self.sent.copy_from_slice(&self.data);
-        self.control = self.control.produced();
+        if !self.is_unseen {
+            self.control = self.control.produced();
+        }
+        self.is_new = true;
     }
 
     /// Takes readiness back: consumers do not accept anything until the next commit.
     pub fn withdraw(&mut self) {
         self.control = ConnectionControl::empty();
+        (self.is_new, self.is_first, self.is_unseen) = (false, false, false);
     }
 
-    /// Writes C-CON and values.
-    pub fn emit(&self, bytes: &mut [u8]) {
+    /// The telegrams that were built last are not sent.
+    pub fn take_back(&mut self) {
+        self.is_unseen = self.is_first;
+    }
+
+    /// Writes C-CON and values into a telegram that is built.
+    pub fn emit(&mut self, bytes: &mut [u8]) {
+        let (is_new, is_unseen) = (std::mem::take(&mut self.is_new), std::mem::take(&mut self.is_unseen));
+        self.is_first = is_new || is_unseen;
         if bytes.len() >= CONNECTION_CONTROL_LEN + self.sent.len() {
             put_u16(bytes, 0, self.control.bits());
             bytes[CONNECTION_CONTROL_LEN..][..self.sent.len()].copy_from_slice(&self.sent);
@@ -442,6 +466,25 @@ mod tests {
         producer.commit();
         producer.emit(&mut bytes);
         assert_eq!(bytes[..2], [0x01, 0x20]);
+        // What was built and not sent keeps its count, with newer values or without.
+        for committed in [true, false] {
+            producer.data()[0] = 9;
+            producer.commit();
+            producer.emit(&mut bytes);
+            let built = bytes;
+            producer.take_back();
+            producer.data()[0] = 1;
+            if committed {
+                producer.commit();
+            }
+            producer.emit(&mut bytes);
+            assert_eq!((bytes[..2].to_vec(), bytes[2]), (built[..2].to_vec(), if committed { 1 } else { 9 }));
+            producer.emit(&mut bytes);
+            producer.take_back();
+            producer.commit();
+            producer.emit(&mut bytes);
+            assert_ne!(bytes[..2], built[..2], "that one was seen");
+        }
         producer.withdraw();
         producer.emit(&mut bytes);
         assert_eq!(bytes, [0, 0, 1, 2, 3, 4]);

@@ -252,6 +252,11 @@ impl Master {
             // Slaves count the cycles that they see.
             net.cycle_count = net.cycle_count.wrapping_sub(1) & 7;
             net.time.take_back(net.cycle_count);
+            for end in net.stations.iter_mut().flat_map(|station| &mut station.ends) {
+                if let End::Producer(producer) = end {
+                    producer.take_back();
+                }
+            }
             skipped += 1;
         }
         if !net.frames.has_transmit() {
