@@ -195,7 +195,7 @@ async fn request(stream: &mut TcpStream) -> io::Result<([u8; 3], Vec<u8>)> {
     stream.read_exact(&mut header).await?;
     let [first, second, protocol @ .., high, low, unit] = header;
     // The unit identifier counts.
-    let len = usize::from(u16::from_be_bytes([high, low])).checked_sub(1).unwrap_or_default();
+    let len = usize::from(u16::from_be_bytes([high, low])).saturating_sub(1);
     let malformed = || io::Error::new(io::ErrorKind::InvalidData, "no Modbus TCP header");
     if !(1..=PDU_MAX).contains(&len) {
         return Err(malformed());

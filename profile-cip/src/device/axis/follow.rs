@@ -303,8 +303,8 @@ impl Axis {
             AxisState::Starting | AxisState::Running => DriveAction::Enable,
             AxisState::Stopping if self.machine.shutdown => DriveAction::Shutdown,
             AxisState::Stopping => DriveAction::Disable,
-            // With a shutdown beneath its fault the axis is free of torque, also where the fault's own action brakes or holds it.
-            AxisState::Aborting | AxisState::MajorFaulted if self.machine.shutdown => DriveAction::Shutdown,
+            // With a shutdown beneath its fault the axis is free of torque, also where the fault's own action holds it.
+            AxisState::MajorFaulted if self.machine.shutdown => DriveAction::Shutdown,
             AxisState::Aborting | AxisState::MajorFaulted => DriveAction::Abort,
             AxisState::Shutdown => DriveAction::Shutdown,
         };
