@@ -369,4 +369,4 @@ impl<'n> Decoder<'n> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -182,7 +182,7 @@ fn open_reply() -> Vec<u8> {
     reply(Service::FORWARD_OPEN, GeneralStatus::SUCCESS, &data)
 }
 
-fn class1(connection_id: u32, count: u16, data: &[u8]) -> Vec<u8> {
+pub(crate) fn class1(connection_id: u32, count: u16, data: &[u8]) -> Vec<u8> {
     let datagram = Class1Datagram {
         connection_id,
         encapsulation_sequence: u32::from(count),
@@ -217,8 +217,8 @@ fn command_update() -> Vec<u8> {
     })
 }
 
-/// A device-to-controller update of axis 1, running.
-fn actual_update() -> Vec<u8> {
+/// A device-to-controller update of axis 1, running, at a position.
+pub(crate) fn actual_update(position: i32) -> Vec<u8> {
     let header = ActualHeader {
         update_id: 17,
         node_status: NodeStatus::REMOTE_MODE | NodeStatus::DATA_VALID,
@@ -235,7 +235,7 @@ fn actual_update() -> Vec<u8> {
         control_mode: ControlMode::POSITION,
         axis_response: AxisControl::ENABLE,
         axis_state: AxisStateCode::RUNNING,
-        actual: ActualValues { position: Some(ActualPosition::Dint(-42)), ..ActualValues::default() },
+        actual: ActualValues { position: Some(ActualPosition::Dint(position)), ..ActualValues::default() },
         ..ActualBlock::default()
     };
     let instance = ActualInstance { number: 1, cyclic: Some(cyclic), ..ActualInstance::default() };
@@ -259,7 +259,7 @@ fn visit() -> Recording {
     recording.tcp(SERVER, CLIENT, &register);
     recording.reply(2, &open_reply());
     recording.udp(CLIENT_IO, SERVER_IO, &class1(O_TO_T, 1, &command_update()));
-    recording.udp(SERVER_IO, CLIENT_IO, &class1(T_TO_O, 1, &actual_update()));
+    recording.udp(SERVER_IO, CLIENT_IO, &class1(T_TO_O, 1, &actual_update(-42)));
     let close = ForwardClose { priority_tick: 5, timeout_ticks: 100, triad: TRIAD, path: &[] };
     let close = emitted(100, |buffer| close.emit(buffer).unwrap());
     recording.request(3, &request(Service::FORWARD_CLOSE, 6, &close));
@@ -286,7 +286,7 @@ fn data_to_another_port_that_the_originator_named_are_read() {
     let port = [Item { item_type: ItemType::SOCKADDR_T_TO_O, data: &port }];
     recording.tcp(CLIENT, SERVER, &send_rr_data_with(1, &open_request(0x42), &port));
     recording.reply(1, &open_reply());
-    let update = class1(T_TO_O, 1, &actual_update());
+    let update = class1(T_TO_O, 1, &actual_update(-42));
     recording.udp(SERVER_IO, CLIENT, &update);
     let text = recording.text(&Options::default());
     assert!(text.contains("count 1 with 28 bytes (T->O of connection 0x1234"), "{text}");

@@ -2,12 +2,6 @@ use std::net::SocketAddrV4;
 
 use profile_cip::wire::class1::CLASS1_HEADER_LEN;
 use profile_cip::wire::encapsulation::IO_PORT;
-use profile_cip::wire::motion::codes::{
-    AxisControl, AxisStateCode, ControlMode, NodeAlarm, NodeFault, NodeStatus,
-};
-use profile_cip::wire::motion::{
-    ActualBlock, ActualHeader, ActualInstance, ActualPosition, ActualValues, ActualWriter,
-};
 use profile_generic::can::{Frame as CanFrame, Id};
 use profile_sercos::wire::describe::NoNames;
 use profile_sercos::wire::header::{Channel, Kind, PhaseField, TelegramType};
@@ -16,6 +10,7 @@ use super::*;
 use crate::capture::Side;
 use crate::capture::synth::Synthesizer;
 use crate::capture::writer::Writer;
+use crate::decode::tests::{actual_update, class1};
 use crate::mapping::Mapping;
 use crate::sys::clock::KernelTime;
 use crate::translate::RowNames;
@@ -55,44 +50,6 @@ fn put_datagram(file: &mut Writer<Vec<u8>>, time_ms: u64, ends: (SocketAddrV4, S
     Synthesizer::new()
         .udp(ends.0, ends.1, 0, data, &mut |frame| file.frame(Side::North, at, frame, None).unwrap())
         .unwrap();
-}
-
-/// An update of the turntable, running.
-fn actual() -> Vec<u8> {
-    let header = ActualHeader {
-        update_id: 17,
-        node_status: NodeStatus::REMOTE_MODE | NodeStatus::DATA_VALID,
-        instance_count: 1,
-        node_fault: NodeFault(0),
-        node_alarm: NodeAlarm(0),
-        last_received_id: 17,
-        time_stamp: None,
-        time_offset: None,
-        update_diagnostics: None,
-        time_diagnostics: None,
-    };
-    let cyclic = ActualBlock {
-        control_mode: ControlMode::POSITION,
-        axis_response: AxisControl::ENABLE,
-        axis_state: AxisStateCode::RUNNING,
-        actual: ActualValues { position: Some(ActualPosition::Dint(250_000)), ..ActualValues::default() },
-        ..ActualBlock::default()
-    };
-    let mut update = [0; 200];
-    let mut writer = ActualWriter::new(&mut update, &header).unwrap();
-    writer
-        .instance(&ActualInstance { number: 1, cyclic: Some(cyclic), ..ActualInstance::default() })
-        .unwrap();
-    let len = writer.finish();
-    let datagram = Class1Datagram {
-        connection_id: 78,
-        encapsulation_sequence: 1,
-        sequence_count: 1,
-        data: &update[..len],
-    };
-    let mut bytes = vec![0; datagram.buffer_len()];
-    datagram.emit(&mut bytes).unwrap();
-    bytes
 }
 
 /// The file with only the first bytes of packet `number`, counted from 0, recorded.
@@ -176,7 +133,7 @@ fn a_recording_cut_in_the_middle_is_translated_up_to_the_cut() {
 fn updates_to_the_port_that_a_controller_named_are_translated() {
     let mut file = writer();
     let ends = (SocketAddrV4::new(BOX, IO_PORT), SocketAddrV4::new(Ipv4Addr::new(10, 0, 0, 1), 50_000));
-    put_datagram(&mut file, 0, ends, &actual());
+    put_datagram(&mut file, 0, ends, &class1(78, 1, &actual_update(250_000)));
     let (text, found) = everything(&file.finish().unwrap());
     assert_eq!(found, counts(1, 0, 0), "{text}");
     assert!(text.contains("Axis State: Running"), "{text}");
