@@ -550,6 +550,7 @@ fn hand_on(
             }
         }
         Purpose::AssemblyParameter { device, ticket } => {
+            note_set(norths.devices, answer.axis, &answer);
             let mut channels = norths.assemblies.iter_mut();
             if let Some(channel) = channels.find(|channel| channel.number() == device) {
                 channel.parameter_answered(ticket, &answer, axis);

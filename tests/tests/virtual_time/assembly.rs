@@ -498,17 +498,25 @@ fn idle_or_a_word_without_enable_counts_among_datagrams_that_come_together() {
     }
 }
 
+/// A drive that does not report its following error: the gateway works it out.
+const NO_FOLLOWING_ERROR: &str = "format = 1\noverlay = \"drives that do not report their following error\"\n[[generic-sercos.mode]]\nmode = \"position\"\n\
+    actual = [\"position_actual\", \"velocity_actual\", \"torque_actual\"]\nsource = \"drives with short telegrams\"\n";
+
 /// The following error belongs to a command that is followed. Without torque there is none.
 #[test]
 fn following_error_is_zero_once_nothing_is_followed() {
-    let mut plc = in_motion();
-    let lag = plc.get(0, "following_error");
-    assert_ne!(lag, 0);
-    plc.word(Control::empty());
-    plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
-    plc.run_for(40);
-    assert_eq!(plc.get(0, "following_error"), 0);
-    assert_eq!(plc.rig.status().axes[0].following_error, Position::ZERO);
+    for overlays in [Vec::new(), vec![NO_FOLLOWING_ERROR]] {
+        let settings = Settings { configuration: configuration("{}"), overlays, ..Settings::default() };
+        let mut plc = moving(Plc::new(settings, RPI));
+        let lag = plc.get(0, "following_error");
+        assert_ne!(lag, 0);
+        // It coasts, so that the last command is not reached any more.
+        plc.rig.drive_mut(0).raise_fault(FaultCause::OVER_CURRENT);
+        plc.until(1_000, "the end of the torque", |plc| plc.rig.torque_free());
+        plc.run_for(40);
+        assert_eq!(plc.get(0, "following_error"), 0);
+        assert_eq!(plc.rig.status().axes[0].following_error, Position::ZERO);
+    }
 }
 
 #[test]
@@ -520,6 +528,31 @@ fn a_closed_connection_stops_as_a_lost_one() {
     plc.connect();
     plc.word(ALL);
     plc.stays_off();
+}
+
+/// A stop that the controller has ordered goes on as ordered when its connection is lost amid it; nothing was running any more.
+#[test]
+fn a_disable_goes_on_after_the_connection_is_lost() {
+    let way = |lost: bool| {
+        let mut plc = plc("{}");
+        plc.connect();
+        plc.enable();
+        plc.target(1_000 * TURN, 10 * TURN, 100 * TURN);
+        plc.word(Control::ENABLE | Control::START);
+        plc.run_for(600);
+        plc.word(Control::empty());
+        plc.run_for(40);
+        let (place, speed) = (plc.place(), plc.speed());
+        assert!((NANO..9 * NANO).contains(&speed) && !plc.rig.torque_free(), "amid the ramp: {speed}");
+        if lost {
+            plc.close();
+        }
+        plc.rig.run_until(DurationNs::from_secs(1), "the end of the torque", Rig::torque_free);
+        assert_eq!(plc.rig.engine.axes()[0].fault(), None, "lost: {lost}");
+        plc.place() - place
+    };
+    let (kept, lost) = (way(false), way(true));
+    assert!(kept > NANO / 20 && (kept - lost).abs() < NANO / 1_000, "{kept} {lost}");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use profile_generic::fault::FaultCause;
 use profile_generic::mode::{ModeSelection, OperatingMode};
 use profile_generic::quantity::{Acceleration, Position, Torque, Velocity};
 use profile_generic::servo::ServoParameters;
-use profile_generic::state::DriveState;
+use profile_generic::state::{DriveState, Report};
 use profile_generic::time::DurationNs;
 use profile_sercos::wire::idn::Idn;
 
@@ -423,6 +423,30 @@ fn a_fault_is_told_and_reset() {
     assert_eq!(bench.order(TURNTABLE, Order::Move(to(0, 5 * NANO, None))), Ok(()));
 }
 
+/// A reset of a drive that is not heard ends in vain at once, not when its time is over.
+#[test]
+fn a_reset_of_a_drive_that_is_not_heard_is_answered_at_once() {
+    let mut bench = Bench::new(ALL);
+    bench.order(TURNTABLE, Order::Enable).unwrap();
+    bench.rig.line.set_mute(0, true);
+    bench.rig.run_until(DurationNs::from_secs(10), "the end of the stop", |rig| {
+        rig.engine.axes()[0].state() == DriveState::Faulted
+    });
+    let before = bench.end.answers.pop();
+    assert!(before.is_err(), "no order is in progress: {before:?}");
+    let id = bench.give(1, TURNTABLE, Order::Reset);
+    let answer = bench.answer(20);
+    let Err(Failure::Fault(cause)) = answer.result else { panic!("{answer:?}") };
+    assert_eq!((answer.id, cause), (id, FaultCause::SOUTH_SILENCE));
+    assert_eq!(bench.state(TURNTABLE), DriveState::Faulted);
+    bench.rig.line.set_mute(0, false);
+    bench.rig.run_until(DurationNs::from_secs(10), "the drive", |rig| {
+        rig.engine.axes()[0].feedback().report != Report::Silent
+    });
+    assert_eq!(bench.order(TURNTABLE, Order::Reset), Ok(()));
+    assert_eq!(bench.order(TURNTABLE, Order::Enable), Ok(()));
+}
+
 #[test]
 fn the_end_of_the_box_ends_local_control() {
     let mut bench = Bench::new(ALL);
@@ -477,10 +501,11 @@ fn a_jog_at_velocity_zero_brakes_with_the_acceleration_of_the_jog_before_it() {
     bench.order(SLIDE, Order::Enable).unwrap();
     let moving =
         Jog { velocity: Velocity(10 * NANO), acceleration: Some(Acceleration(50 * NANO)), time: JOG_TIME };
+    let brake = Jog { velocity: Velocity::ZERO, acceleration: None, time: JOG_TIME };
+    assert_eq!(bench.order(SLIDE, Order::Jog(brake)), Ok(()), "it rests already");
     assert_eq!(bench.order(SLIDE, Order::Jog(moving)), Ok(()));
     bench.run_for(300);
     assert!(bench.speed(SLIDE) > 9 * NANO, "{}", bench.speed(SLIDE));
-    let brake = Jog { velocity: Velocity::ZERO, acceleration: None, time: JOG_TIME };
     assert_eq!(bench.order(SLIDE, Order::Jog(brake)), Ok(()));
     bench.run_for(100);
     let amid = bench.speed(SLIDE);

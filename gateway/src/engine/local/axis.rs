@@ -169,14 +169,19 @@ impl LocalAxis {
 
     fn jog(&mut self, now: Now, axis: &mut AxisChannel, jog: Jog) -> Result<(), Failure> {
         check_enabled(axis)?;
-        if jog.velocity == Velocity::ZERO
-            && jog.acceleration.is_none()
-            && let Source::Generator { generator, jog_ends } = &mut self.source
-        {
-            // A profile in progress brakes with its own acceleration: the axis may have no other.
-            generator.profile.brake();
-            *jog_ends = None;
-            return Ok(());
+        // The axis may have no acceleration of its own.
+        if jog.velocity == Velocity::ZERO && jog.acceleration.is_none() {
+            match &mut self.source {
+                // It holds its position.
+                Source::None => return Ok(()),
+                // A profile in progress brakes with its acceleration.
+                Source::Generator { generator, jog_ends } => {
+                    generator.profile.brake();
+                    *jog_ends = None;
+                    return Ok(());
+                }
+                Source::Drive => {}
+            }
         }
         let acceleration = generator::acceleration(axis, jog.velocity, jog.acceleration)?;
         let mode = generator::run_mode(axis)?;

@@ -43,20 +43,17 @@ function buildAxis(name) {
     samples: new Samples(`/api/v1/traces?axis=${name}&`, MINUTE / SAMPLE),
     reported: {},
     sheet: null,
+    asked: false,
     seen: null,
   });
   buildParameters(section(view, 'axis-parameters', 'Parameters of the drive', true), name);
-  fetchOnce(`/api/v1/axis?axis=${name}`, (sheet) => {
-    if (axisView.name !== name) return;
-    axisView.sheet = sheet;
-    suggest(sheet.limits);
-  });
 }
 
 function showAxis({ status, history }, name) {
   const axis = status.axes.find((known) => known.name === name);
   if (!axis) return unknown(`There is no axis ${name}.`);
   if (axisView.name !== name) buildAxis(name);
+  askSheet(axisView, (sheet) => suggest(sheet.limits));
   const place = [axis.bus, axis.drive, axis.address].filter(Boolean).join(', ');
   setText(axisView.subtitle, axis.device ? `${axis.device} → ${place}` : place);
   const [controller, generic, drive] = axisView.level;

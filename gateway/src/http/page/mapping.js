@@ -20,13 +20,7 @@ function buildMapping(name) {
   filter.type = 'search';
   filter.placeholder = 'name, attribute, IDN, object';
   filter.addEventListener('input', filterMapping);
-  Object.assign(mappingView, { name, subtitle, filter, table: table(part, MAPPED), sheet: null, live: [] });
-  fetchOnce(`/api/v1/axis?axis=${name}`, (sheet) => {
-    if (mappingView.name !== name) return;
-    mappingView.sheet = sheet;
-    fillMapping(sheet);
-    if (last) showMapping(last, name);
-  });
+  Object.assign(mappingView, { name, subtitle, filter, table: table(part, MAPPED), sheet: null, asked: false, live: [] });
 }
 
 function fillMapping(sheet) {
@@ -52,6 +46,10 @@ function showMapping({ status }, name) {
   const axis = status.axes.find((known) => known.name === name);
   if (!axis) return unknown(`There is no axis ${name}.`);
   if (mappingView.name !== name) buildMapping(name);
+  askSheet(mappingView, (sheet) => {
+    fillMapping(sheet);
+    if (last) showMapping(last, name);
+  });
   setText(mappingView.subtitle, [axis.device, axis.bus, axis.drive, axis.address].filter(Boolean).join(', '));
   for (const { field, cell } of mappingView.live) {
     const value = axis[field];

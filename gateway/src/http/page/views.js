@@ -150,6 +150,18 @@ async function fetchOnce(path, use, failed) {
   }
 }
 
+// Asks for what an axis has besides its state, when a view of it is shown the first time; the next state asks again if that has failed.
+function askSheet(view, use) {
+  if (view.asked) return;
+  const { name } = view;
+  view.asked = true;
+  fetchOnce(`/api/v1/axis?axis=${name}`, (sheet) => {
+    if (view.name !== name) return;
+    view.sheet = sheet;
+    use(sheet);
+  }, () => { if (view.name === name) view.asked = false; });
+}
+
 window.addEventListener('hashchange', () => {
   if (last && (window.location.hash === '' || window.location.hash.startsWith('#/'))) show(last);
 });
