@@ -22,7 +22,7 @@ use profile_cip::wire::message_router::{Reply, Request};
 use profile_cip::wire::motion::codes::{AxisControl, ControlMode, MotionService, NodeControl};
 use profile_cip::wire::motion::{
     ActualFrame, CommandBlock, CommandHeader, CommandInstance, CommandPosition, CommandValues, CommandWriter,
-    Format, ServiceRequest,
+    Format, ServiceRequest, run_idle,
 };
 use profile_cip::wire::status::Service;
 use profile_generic::scaling::{NANO, UnitKind};
@@ -161,7 +161,11 @@ impl Device {
         let len = self.motion.poll_transmit(now, Some(system), &mut buffer[HEAD..])?;
         let connection = self.motion.connection()?;
         assert!(len <= usize::from(connection.t_to_o_size), "{len}");
-        ActualFrame::parse(&buffer[HEAD + SEQUENCE_COUNT_LEN..HEAD + len]).expect("what the device sends");
+        let (update, revision) = (&buffer[HEAD + SEQUENCE_COUNT_LEN..HEAD + len], connection.format_revision);
+        let (run, update) =
+            run_idle::split(revision, update).expect("a run/idle header, where one is agreed on");
+        assert!(run, "the device sends no idle");
+        ActualFrame::parse_as(update, revision).expect("what the device sends");
         self.sequence += 1;
         let count = u16::from_le_bytes([buffer[HEAD], buffer[HEAD + 1]]);
         Class1Datagram::emit_header(
