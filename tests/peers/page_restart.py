@@ -16,6 +16,11 @@ from page import VIEW, Browser
 
 LIMITS = "(axisView.limits ? axisView.limits.textContent : '')"
 VELOCITY = "document.getElementById('control-velocity').value"
+# The next question about an axis fails.
+FAIL_ONCE = (
+    "(() => { const answered = window.fetch; window.failed = 0; window.fetch = (path, ...more) => {"
+    " if (window.failed > 0 || !path.startsWith('/api/v1/axis?')) return answered(path, ...more);"
+    " window.failed += 1; return Promise.reject(new TypeError('on purpose')); }; })()")
 LOST = "{ ...last, status: { ...last.status, axes: last.status.axes.map((axis) => ({ ...axis, inhibits: ['no_drive'] })) } }"
 
 
@@ -27,8 +32,13 @@ def main():
         try:
             browser.open(f"{url}#/mapping/turntable", f"!!{VIEW} && {VIEW}.id === 'view-mapping' && mappingView.live.length > 0")
             report["mapping"] = browser.value(f"(() => {{ showMapping({LOST}, 'turntable'); return mappingView.table.innerText; }})()")
-            browser.value("window.location.hash = '#/axis/turntable'")
+            browser.value(FAIL_ONCE)
+            browser.value("window.location.hash = '#/mapping/slide'")
+            browser.until("mappingView.name === 'slide' && mappingView.live.length > 0", "the mapping after a question that failed")
+            report["failed"] = [browser.value("window.failed")]
+            browser.value("window.failed = 0; window.location.hash = '#/axis/turntable'")
             browser.until(f"{LIMITS}.includes('10.000 rev/s')", "the limits")
+            report["failed"].append(browser.value("window.failed"))
             browser.until("axisView.samples.lists !== null", "the last minute")
             # A torque and a velocity that no telegram has.
             report["absent"] = browser.value(

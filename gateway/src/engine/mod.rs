@@ -549,8 +549,8 @@ fn hand_on(
                 local.parameter_answered(ticket, &answer, axis);
             }
         }
+        // Its axis is none of a motion device, which alone gives back what a controller has set.
         Purpose::AssemblyParameter { device, ticket } => {
-            note_set(norths.devices, answer.axis, &answer);
             let mut channels = norths.assemblies.iter_mut();
             if let Some(channel) = channels.find(|channel| channel.number() == device) {
                 channel.parameter_answered(ticket, &answer, axis);

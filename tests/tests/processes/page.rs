@@ -100,6 +100,8 @@ fn page_begins_anew_after_a_restart_and_shows_what_a_lost_drive_has_reported_las
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let report: Value = serde_json::from_slice(&output.stdout).expect("one object");
         assert_eq!((&report["before"], &report["after"]), (&"1".into(), &"1.2".into()));
+        // The first question of the mapping and of the axis has failed, and they are shown all the same.
+        assert_eq!(report["failed"], serde_json::json!([1, 1]));
         let absent = report["absent"].as_str().expect("a text");
         for name in ["Torque", "Velocity"] {
             assert!(absent.contains(&format!("{name}\nnot reported")), "{absent}");

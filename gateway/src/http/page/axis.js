@@ -53,7 +53,10 @@ function showAxis({ status, history }, name) {
   const axis = status.axes.find((known) => known.name === name);
   if (!axis) return unknown(`There is no axis ${name}.`);
   if (axisView.name !== name) buildAxis(name);
-  askSheet(axisView, (sheet) => suggest(sheet.limits));
+  askSheet(axisView, (sheet) => {
+    axisView.sheet = sheet;
+    suggest(sheet.limits);
+  });
   const place = [axis.bus, axis.drive, axis.address].filter(Boolean).join(', ');
   setText(axisView.subtitle, axis.device ? `${axis.device} → ${place}` : place);
   const [controller, generic, drive] = axisView.level;

@@ -20,7 +20,7 @@ function buildMapping(name) {
   filter.type = 'search';
   filter.placeholder = 'name, attribute, IDN, object';
   filter.addEventListener('input', filterMapping);
-  Object.assign(mappingView, { name, subtitle, filter, table: table(part, MAPPED), sheet: null, asked: false, live: [] });
+  Object.assign(mappingView, { name, subtitle, filter, table: table(part, MAPPED), asked: false, live: [] });
 }
 
 function fillMapping(sheet) {

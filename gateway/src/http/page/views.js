@@ -156,9 +156,7 @@ function askSheet(view, use) {
   const { name } = view;
   view.asked = true;
   fetchOnce(`/api/v1/axis?axis=${name}`, (sheet) => {
-    if (view.name !== name) return;
-    view.sheet = sheet;
-    use(sheet);
+    if (view.name === name) use(sheet);
   }, () => { if (view.name === name) view.asked = false; });
 }
 
